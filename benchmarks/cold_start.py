@@ -37,15 +37,15 @@ run()
 
 def start(words: list[str], here: Path, cache: Path) -> dict[str, float]:
     """Run a command in a folder, and return its times. [s]"""
-    told, began = here / "spent.json", perf_counter()
+    reported, began = here / "spent.json", perf_counter()
     subprocess.run(
-        [sys.executable, "-c", COMMAND, *words, str(told)],
+        [sys.executable, "-c", COMMAND, *words, str(reported)],
         cwd=here,
         env=os.environ | {"SUBZERO_CACHE_DIR": str(cache)},
         stdout=subprocess.DEVNULL,
         check=True,
     )
-    command, second = json.loads(told.read_text())
+    command, second = json.loads(reported.read_text())
     return {"by_the_clock": perf_counter() - began, "processor_command": command, "processor_second": second}
 
 

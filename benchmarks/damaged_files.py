@@ -226,17 +226,17 @@ def main() -> int:
     parser.add_argument(
         "--kinds", nargs="+", default=[kind for kind in KINDS if kind != "old netCDF"], choices=list(KINDS)
     )
-    told = parser.parse_args()
-    counts = {kind: Counter() for kind in told.kinds}
+    reported = parser.parse_args()
+    counts = {kind: Counter() for kind in reported.kinds}
     shown: set[str] = set()
     with tempfile.TemporaryDirectory() as home:
         clean, spoilt = Path(home) / "clean", Path(home) / "spoilt"
         clean.mkdir()
         make_good(clean)
         reader = Reader()
-        for number in range(told.count):
-            kind = told.kinds[number % len(told.kinds)]
-            rng = np.random.default_rng([told.seed, number])
+        for number in range(reported.count):
+            kind = reported.kinds[number % len(reported.kinds)]
+            rng = np.random.default_rng([reported.seed, number])
             shutil.rmtree(spoilt, ignore_errors=True)
             shutil.copytree(clean / kind, spoilt)
             files = sorted(spoilt.glob(KINDS[kind][1]))

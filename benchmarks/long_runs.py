@@ -108,12 +108,12 @@ def force_of(trial: scenarios.Trial) -> tuple[np.ndarray, int, float, float]:
     """Return the force on the vehicle (times, 3) [N], how many segments and how much cable there are at the end, and
     the CPU time [m, s].
     """
-    begun = process_time()
+    started = process_time()
     run = run_trial(dataclasses.replace(trial, every=trial.duration), subzero.Model.of(trial), tethered=True)
     if not run.completed:
         raise subzero.UserError(run.message)
     trace, length = run.recording.trace, float(run.recording.length[-1])
-    return trace[:, :3], int(trace[-1, 3]) - 1, length, process_time() - begun
+    return trace[:, :3], int(trace[-1, 3]) - 1, length, process_time() - started
 
 
 def change_of_force(trial: scenarios.Trial, far_grading: float, even: np.ndarray) -> tuple[float, int, float]:
@@ -157,9 +157,9 @@ def measure(name: str) -> dict[str, float]:
     from subzero.results.netcdf_csv import write_run
 
     subzero.simulate("fig6")  # whatever is loaded or compiled once
-    trial, begun = trial_of(**LONG[name]), process_time()  # type: ignore[arg-type]
+    trial, started = trial_of(**LONG[name]), process_time()  # type: ignore[arg-type]
     run = subzero.simulate(trial)
-    took = process_time() - begun
+    took = process_time() - started
     with tempfile.TemporaryDirectory() as folder:
         with open_output_folder(Path(folder) / "run") as output_folder:
             write_run(run, output_folder, "tethered")
@@ -169,7 +169,7 @@ def measure(name: str) -> dict[str, float]:
         "cable [m]": float(run["cable_length"][-1]),
         "segments": float(run["node_count"].max()) - 1.0,
         "run [CPU s]": took,
-        "writing [CPU s]": process_time() - begun - took,
+        "writing [CPU s]": process_time() - started - took,
         "memory [MiB]": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0,
         "netCDF [MB]": size / 1e6,
         "force error": accuracy["force_error"],

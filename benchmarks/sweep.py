@@ -53,10 +53,10 @@ def bare_loop(members, changes=None, share=(0, 1)):
     one.job.run(0, one.points.values[0])
     print("ready", flush=True)
     sys.stdin.readline()
-    begun = time.perf_counter()
+    started = time.perf_counter()
     for index in range(share[0], members, share[1]):
         one.job.run(index, one.points.values[index])
-    return time.perf_counter() - begun
+    return time.perf_counter() - started
 
 
 def bare_loops(members, at_a_time):
@@ -85,10 +85,10 @@ def timed(one, workers=None):
     from subzero.sweeps.api import finished
 
     with tempfile.TemporaryDirectory() as folder:
-        begun = time.perf_counter()
+        started = time.perf_counter()
         with finished(one, Path(folder), workers=workers):
             pass
-        return time.perf_counter() - begun
+        return time.perf_counter() - started
 
 
 @contextmanager
@@ -180,7 +180,7 @@ def command_of_200():
 
     spec = Path(__file__).parents[1] / "scenarios/sweeps/cable_and_current.toml"
     with tempfile.TemporaryDirectory() as folder:
-        begun, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+        started, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
         subprocess.run(
             [sys.executable, "-m", "subzero", "sweep", str(spec), "--out", f"{folder}/out"],
             check=True,
@@ -188,7 +188,7 @@ def command_of_200():
         )
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         spent = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        took = time.perf_counter() - begun
+        took = time.perf_counter() - started
     print(
         f"subzero sweep of 200 runs, all files: {took:.2f} s, {spent:.2f} s of processor; load {os.getloadavg()[0]:.1f}"
     )
@@ -217,10 +217,10 @@ def peak_memory(members):
 def memory():
     """Print the peak memory of sweeps of different sizes."""
     for members in (1000, 20000):
-        begun = time.perf_counter()
+        started = time.perf_counter()
         own, workers = peak_memory(members)
         print(
-            f"{members:>6} members: {own:6.0f} MB, a worker {workers:6.0f} MB   ({time.perf_counter() - begun:.0f} s)"
+            f"{members:>6} members: {own:6.0f} MB, a worker {workers:6.0f} MB   ({time.perf_counter() - started:.0f} s)"
         )
 
 
@@ -244,12 +244,12 @@ def stores(members=20000, batch=20):
     print(f"{'store':<10}{'ms a batch':>12}{'MB':>8}{'files':>8}{'s to read':>11}")
     for name, (write, read) in _stores().items():
         home = Path(tempfile.mkdtemp())
-        begun = time.perf_counter()
+        started = time.perf_counter()
         write(home, batches())
-        wrote = time.perf_counter() - begun
-        begun = time.perf_counter()
+        wrote = time.perf_counter() - started
+        started = time.perf_counter()
         read(home)
-        took = time.perf_counter() - begun
+        took = time.perf_counter() - started
         files = [path for path in home.rglob("*") if path.is_file()]
         size = sum(path.stat().st_size for path in files) / 1e6
         print(f"{name:<10}{1e3 * wrote * batch / members:>12.2f}{size:>8.1f}{len(files):>8}{took:>11.2f}")
@@ -275,32 +275,32 @@ def member(count=200):
         f"{count} members of fig6, {len(job.outcomes.scalars)} scalars, {shape[0]} channels of {shape[1]} times"
     )
 
-    def told(what, call, number=None, per=count):
-        begun = process_time()
+    def reported(what, call, number=None, per=count):
+        started = process_time()
         result = call()
         size = "" if number is None else f"{number(result) / per:10.0f} bytes"
-        print(f"{what:<34}{1e3 * (process_time() - begun) / per:9.3f} ms{size}")
+        print(f"{what:<34}{1e3 * (process_time() - started) / per:9.3f} ms{size}")
         return result
 
-    told(
+    reported(
         "a batch of one, sent",
         lambda: cloudpickle.dumps((run_members, (job, indices[:1], rows[:1]), {})),
         len,
         1,
     )
-    sent = told(
+    sent = reported(
         "a batch of all, sent", lambda: cloudpickle.dumps((run_members, (job, indices, rows), {})), len
     )
-    made = told("run", lambda: run_members(job, indices, rows))
-    back = told("sent back", lambda: pickle.dumps(made, protocol=pickle.HIGHEST_PROTOCOL), len)
-    told("read by the parent", lambda: (pickle.loads(back), pickle.loads(sent)))
+    made = reported("run", lambda: run_members(job, indices, rows))
+    back = reported("sent back", lambda: pickle.dumps(made, protocol=pickle.HIGHEST_PROTOCOL), len)
+    reported("read by the parent", lambda: (pickle.loads(back), pickle.loads(sent)))
     with tempfile.TemporaryDirectory() as folder:
         with opened(Path(folder), one.manifest(), shape) as store:
-            told("kept, a member a transaction", lambda: [store.add([each]) for each in made])
+            reported("kept, a member a transaction", lambda: [store.add([each]) for each in made])
         (Path(folder) / FILE).unlink()
         with opened(Path(folder), one.manifest(), shape) as store:
-            told("kept, all in one transaction", lambda: store.add(made))
-            told("read from the store", lambda: list(store.blocks()))
+            reported("kept, all in one transaction", lambda: store.add(made))
+            reported("read from the store", lambda: list(store.blocks()))
         print(f"{'in the store':<43}{(Path(folder) / FILE).stat().st_size / count:15.0f} bytes")
     print(f"{'a worker, at most':<43}{1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss:15.3g} bytes")
 

@@ -93,9 +93,9 @@ class Tally:
 
     def after(self, folder: Path, log: Path) -> int:
         """Look at what is kept and what has run, while nothing runs; return how many members the command has kept."""
-        begun = np.fromfile(log, dtype="<u4")[self._read :] if log.exists() else np.zeros(0)
-        self.again += len(self._done.intersection(begun.tolist()))
-        self._read += begun.size
+        started = np.fromfile(log, dtype="<u4")[self._read :] if log.exists() else np.zeros(0)
+        self.again += len(self._done.intersection(started.tolist()))
+        self._read += started.size
         now = _kept(folder)
         assert now >= self._done, "a member is lost"
         gained, self._done = len(now - self._done), now

@@ -42,9 +42,9 @@ def median(run, repeats, clock=time.process_time):
     run()
     times = []
     for _ in range(repeats):
-        begun = clock()
+        started = clock()
         run()
-        times.append(clock() - begun)
+        times.append(clock() - started)
     return statistics.median(times)
 
 

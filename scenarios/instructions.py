@@ -130,7 +130,7 @@ class Motion:
                 check.freeze(name, self._continuous(name, array) if self.is_smooth else array)
         at = gap_at(self.time) if self.is_smooth else None
         if at is not None:
-            check.say(f"time[{at}]", *gap_words(self.time, at), self.time[at])
+            check.say(f"time[{at}]", *gap_in_words(self.time, at), self.time[at])
         check.refuse()
 
     def _continuous(self, name: str, angle: np.ndarray) -> np.ndarray:
@@ -182,7 +182,7 @@ def gap_at(time: np.ndarray) -> int | None:
     return int(late[0]) + 1 if late.size else None
 
 
-def gap_words(time: np.ndarray, at: int) -> tuple[str, str]:
+def gap_in_words(time: np.ndarray, at: int) -> tuple[str, str]:
     """Return why a gap before sample `at` cannot be, and what to do."""
     gap, usual = time[at] - time[at - 1], float(np.median(np.diff(time)))
     why = f"nothing is known for {gap:g} s before it, in a record with a sample every {usual:g} s"

@@ -32,7 +32,7 @@ from scenarios.instructions import (
     Motion,
     ends_early,
     gap_at,
-    gap_words,
+    gap_in_words,
     interpolation_of,
     motion_faults,
 )
@@ -243,7 +243,7 @@ def _check_smooth(samples: Samples, duration: float | None) -> list[Problem]:
     """Return what is not known of a smooth motion: a gap, and what comes behind its last sample."""
     time = np.asarray(samples.time, dtype=float)
     at = gap_at(time)
-    problems = [] if at is None else [samples.problem(at, *gap_words(time, at))]
+    problems = [] if at is None else [samples.problem(at, *gap_in_words(time, at))]
     if duration is not None and time[-1] < duration - NUMERICAL:
         problems.append(samples.problem(time.size - 1, ends_early(duration), REACH_THE_END))
     return problems

@@ -380,7 +380,7 @@ class Trial:
         """Return what it is, how long it lasts, how it starts, and what the vehicle is told."""
         start, cable = self.start, self.cable
         heading, speed = np.degrees(start.heading), start.surge_speed
-        told = self.commands if self.commands is not None else self.motion
+        reported = self.commands if self.commands is not None else self.motion
         rows = [
             ("duration", f"{self.duration:g} s, hull in steps of {self.hull_step:g} s"),
             (
@@ -404,9 +404,9 @@ class Trial:
                 + (", on a vessel" if self.vessel else ""),
             ),
         ]
-        if told is not None:
-            kind = "commands" if told is self.commands else "motion"
-            rows.append((kind, f"{len(told.time)} rows, to {float(told.time[-1]):g} s"))
+        if reported is not None:
+            kind = "commands" if reported is self.commands else "motion"
+            rows.append((kind, f"{len(reported.time)} rows, to {float(reported.time[-1]):g} s"))
         rows.append(("change it", 'trial.with_changes({"cable.diameter": 0.003})'))
         return Overview(f"Trial {self.name}: {self.description}", rows)
 

@@ -28,7 +28,7 @@ def run() -> None:
             print(f"Standard output cannot be written: {error.strerror}.", file=sys.stderr)
             code = code or UNWRITABLE
     except KeyboardInterrupt:  # before the command line was ready, or while it said so
-        interrupts.say_interrupted()
+        interrupts.print_interrupted()
         code = interrupts.INTERRUPTED
     gc.freeze()  # what is left goes with the process: to take it apart first takes a second
     interrupts.leave(code)

@@ -296,7 +296,7 @@ def line_of(one: Mapping[str, Any]) -> str:
     held, error = sum(row["held"] for row in rows), one["error"]
     text = f"{head} {held}/{len(rows)} fourth trial {one['later_error']:.3f}, "
     text += f"one left out {error['before']:.3g} → {error['after']:.3f}"
-    text += f" {one['cpu']:.0f} s {', '.join(missed)}{'' if is_told(one) else ' refused'}"
+    text += f" {one['cpu']:.0f} s {', '.join(missed)}{'' if is_reported(one) else ' refused'}"
     if "diagnosed" in one:
         said = one["diagnosed"]
         text += f" | before {said['before']['verdict']} | {said['cause']}: true {said['true']['first']}"
@@ -317,7 +317,7 @@ def _row(name: str, results: Sequence[Mapping[str, Any]]) -> str:
         for one in results
         if name in (one["noise"], one["vehicle"], cable_of(one), "all") and "numbers" in one
     ]
-    own = [one for one in every if is_told(one)]
+    own = [one for one in every if is_reported(one)]
     held = [row["held"] for one in own for row in one["numbers"].values()]
     error = {"before": [one["error"]["before"] for one in own], "after": [one["later_error"] for one in own]}
     before, after = (float(np.median(error[when])) if own else np.nan for when in error)
@@ -336,7 +336,7 @@ def cable_of(one: Mapping[str, Any]) -> str:
     return CABLES[0] if one["tethered"] else CABLES[1]
 
 
-def is_told(one: Mapping[str, Any]) -> bool:
+def is_reported(one: Mapping[str, Any]) -> bool:
     """Say whether a calibration was made, and not refused."""
     return bool(one["verdict"] == CALIBRATED)
 

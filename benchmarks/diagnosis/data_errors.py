@@ -138,8 +138,8 @@ def _truth(one: world.Drawn, what: str, rng: np.random.Generator) -> Truth:
     name = one.cause if planted else ""
     if what == "begun":
         name = list(onsets.CAUSES)[one.index // 8 % len(onsets.CAUSES)]
-        begun = onsets.hidden(onsets.CAUSES[name], setting, rng)
-        true = with_onset(onsets.CAUSES[name], begun.time).apply(true, *begun.values)
+        started = onsets.hidden(onsets.CAUSES[name], setting, rng)
+        true = with_onset(onsets.CAUSES[name], started.time).apply(true, *started.values)
     duration = setting.trial.duration + world.AFTER
     times = np.arange(0.0, setting.trial.duration + 1e-9, DENSE_S)
     shown = agreed(replace(true, trial=replace(true.trial, duration=duration)), times, CHANNELS)
@@ -286,9 +286,9 @@ def result_of(case: Case, make: Any = made, diagnose: Any = diagnose_trials) -> 
         record = make(one, kinds, what)
         found |= {"cause": record.hidden, "D": record.D, "errors": [error.id for error in record.errors]}
         found |= {"numbers": [error.amount for error in record.errors]}
-        begun, cpu = perf_counter(), process_time()
+        started, cpu = perf_counter(), process_time()
         verdict = diagnose([record.logged], seed=one.index, budget="verdict")
-        found |= {"seconds": perf_counter() - begun, "cpu": process_time() - cpu, **_said(verdict)}
+        found |= {"seconds": perf_counter() - started, "cpu": process_time() - cpu, **_said(verdict)}
         return found | {"named": is_right(record, verdict)}
     except Exception as error:
         return found | {"error": repr(error)}
@@ -313,18 +313,20 @@ def is_right(record: Made, verdict: Verdict) -> bool:
             "late_clock"
         }
         return verdict.verdict != "data_error" or is_clock
-    told, true = verdict.data_errors, record.errors
+    reported, true = verdict.data_errors, record.errors
     return (
-        verdict.verdict == "data_error" and len(told) == len(true) and all(_is_among(e, told) for e in true)
+        verdict.verdict == "data_error"
+        and len(reported) == len(true)
+        and all(_is_among(e, reported) for e in true)
     )
 
 
-def _is_among(error: DataError, told: Sequence[Any]) -> bool:
+def _is_among(error: DataError, reported: Sequence[Any]) -> bool:
     """Say whether an error is told, with about the right number."""
     near = {"late_clock": SAME_DELAY_S, "latency": SAME_DELAY_S, "clock_rate": SAME_RATE,
             "step": SAME_STEP * abs(error.amount)}.get(error.kind, 0.0)  # fmt: skip
-    same = [one for one in told if one.id in _names(error)]
-    words = [other for one in told for other in one.alike]
+    same = [one for one in reported if one.id in _names(error)]
+    words = [other for one in reported for other in one.alike]
     return any(abs(one.amount - error.amount) <= near for one in same) or any(
         other.startswith(error.sentence()) for other in words
     )
@@ -349,10 +351,10 @@ def line_of(one: Mapping[str, Any]) -> str:
     mark = "  " if one["named"] else "! " if is_taken_for_physics(one) or not one["kinds"] else "? "
     planted = zip(one["errors"], one["numbers"], one["D"], strict=True)
     true = " + ".join(f"{name} {size:.3g} (D {D:.0f})" for name, size, D in planted)
-    told = " + ".join(
+    reported = " + ".join(
         f"{name} {size:.3g}" for name, size in zip(one["told"], one["told_numbers"], strict=True)
     )
-    said = f"{one['verdict']} [{told}] {one['told_p']:.2f}; {one['first']} {one['p']:.2f}"
+    said = f"{one['verdict']} [{reported}] {one['told_p']:.2f}; {one['first']} {one['p']:.2f}"
     return f"{mark}{head} {one['cause']} {true or 'no error'} → {said} {one['seconds']:.0f} s, CPU {one['cpu']:.0f} s"
 
 

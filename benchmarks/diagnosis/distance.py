@@ -105,8 +105,8 @@ def sudden_distance(
     """
     zero, setting = np.zeros(len(problem.entries)), problem.records[0].setting
     effects = {effect.id: effect for effect in problem.sudden_effects}
-    begun = with_onset(effects[one], time).apply(setting, *values)
-    change, D = change_by(problem, setting, begun), variances(problem.entries, (), 1.0)
+    started = with_onset(effects[one], time).apply(setting, *values)
+    change, D = change_by(problem, setting, started), variances(problem.entries, (), 1.0)
     q = Quadratic(A=J.T @ J, b=J.T @ change, rr=float(change @ change))
     base, found = posterior(q, D), dict([strangeness(problem, J, change)[::-1]])
     others = [without_common(effect, one) for effect in effects.values() if effect.id != one]

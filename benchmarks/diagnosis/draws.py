@@ -70,11 +70,11 @@ def with_values(setting: Setting, values: Values, table: Mapping[str, Effect] | 
     return setting
 
 
-def with_begun(setting: Setting, values: Values, begun: Values, starts: Mapping[str, float]) -> Setting:
+def with_begun(setting: Setting, values: Values, started: Values, starts: Mapping[str, float]) -> Setting:
     """Return a setting with deviations, and further ones on top of them, each from a time on. [s]"""
     models = []
     for name, time in starts.items():
-        total = [np.clip(a + b, p.low, p.high) for a, b, p in zip(values[name], begun[name],
+        total = [np.clip(a + b, p.low, p.high) for a, b, p in zip(values[name], started[name],
                                                                   effects()[name].parameters, strict=True)]  # fmt: skip
         models.append((time, with_values(setting, {**values, name: tuple(map(float, total))}).model))
     return replace(with_values(setting, values), later=tuple(models))

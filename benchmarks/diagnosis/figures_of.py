@@ -144,7 +144,9 @@ def _outside(results: Sequence[Result]) -> list[Score]:
     flagged = [one for one in cases if one["verdict"] == "outside_catalogue"]
     forces = [one for one in flagged if one["strange"] != "wandering"]
     rms = [one["outside"]["rms"] for one in forces if "rms" in one["outside"]]
-    told = [one for one in forces if one["outside"]["features"] and one["outside"].get("first") is not None]
+    reported = [
+        one for one in forces if one["outside"]["features"] and one["outside"].get("first") is not None
+    ]
     return [
         share("outside, D ≥ 16: flagged", cases, is_right, "≥ 95 %", least=0.95),
         share("… with D ≥ 50: flagged", [one for one in cases if smallest_D(one) >= PLAIN], is_right, "–"),
@@ -152,7 +154,7 @@ def _outside(results: Sequence[Result]) -> list[Score]:
         share("outside: axis (or channel) right, of those flagged", flagged,
               lambda one: one["outside"]["axis"] == one["outside"]["found"], "≥ 90 %", least=0.9),
         number("outside: RMS error of the history, of its largest", rms, "≤ 10 %", "{:.1%}", most=0.1),
-        share("outside: right feature in the formula's first two", told,
+        share("outside: right feature in the formula's first two", reported,
               lambda one: bool(set(one["outside"]["features"]) & set(one["outside"]["first"])), "≥ 70 %", least=0.7),
     ]  # fmt: skip
 

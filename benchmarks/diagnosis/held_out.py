@@ -42,11 +42,11 @@ def _fits(verdict: Verdict, work: Findings) -> dict[str, Fit]:
     """Return the fits that are compared."""
     candidates = work.search.candidates
     found = {"tolerance": candidates[()].fit}
-    told = tuple(sorted(cause.id for cause in verdict.causes))
-    if told in candidates:
-        found["extended"] = candidates[told].fit
-    others = [one for ids, one in candidates.items() if ids and not set(ids) & set(told)]
-    if others and told:
+    reported = tuple(sorted(cause.id for cause in verdict.causes))
+    if reported in candidates:
+        found["extended"] = candidates[reported].fit
+    others = [one for ids, one in candidates.items() if ids and not set(ids) & set(reported)]
+    if others and reported:
         found["rival"] = max(others, key=lambda one: one.log_posterior).fit
     return found
 

@@ -96,9 +96,11 @@ def record_of(one: Drawn) -> tuple[Logged, Begun]:
         rng = one.rng(attempt)
         setting, family = flown(one, rng), FAMILIES[one.family]
         times = np.arange(0.0, setting.trial.duration + 1e-9, family.step)
-        begun, numbers = hidden(CAUSES[one.cause], setting, rng), nuisances(rng)
+        started, numbers = hidden(CAUSES[one.cause], setting, rng), nuisances(rng)
         longer = replace(setting, trial=replace(setting.trial, duration=setting.trial.duration + AFTER))
-        true = with_onset(CAUSES[begun.cause], begun.time).apply(with_values(longer, numbers), *begun.values)
+        true = with_onset(CAUSES[started.cause], started.time).apply(
+            with_values(longer, numbers), *started.values
+        )
         try:
             shown = agreed(true, times, CHANNELS)
         except (NoRunError, subzero.UserError):
@@ -106,7 +108,7 @@ def record_of(one: Drawn) -> tuple[Logged, Begun]:
         values = {name: seen_by(family, name, column, times, rng) for name, column in shown.items()}
         return Logged(
             record=Record(source="world", time=times, values=values), setting=setting, name=one.flown
-        ), begun
+        ), started
     message = f"Record {one.index} ({one.cause} on {one.flown}) has no truth."
     raise NoRunError(message)
 
@@ -115,17 +117,19 @@ def result_of(one: Drawn) -> dict[str, Any]:
     """Return what a record is and what the diagnosis says of it."""
     found = {"index": one.index, "flown": one.flown, "family": one.family, "cause": one.cause}
     try:
-        logged, begun = record_of(one)
+        logged, started = record_of(one)
         problem = with_true_noise(pose([logged]), FAMILIES[one.family])
-        D, rival = sudden_distance(problem, sensitivities(problem), begun.cause, begun.values, begun.time)
+        D, rival = sudden_distance(
+            problem, sensitivities(problem), started.cause, started.values, started.time
+        )
         start = perf_counter()
         verdict = diagnose_trials([logged], seed=one.index, budget="verdict")
         first, p = next(iter(verdict.probabilities.items()))
         found |= {
             "D": D,
             "rival": rival,
-            "time": begun.time,
-            "values": begun.values,
+            "time": started.time,
+            "values": started.values,
             "verdict": verdict.verdict,
         }
         found |= {"first": first.partition("@")[0], "began": float(first.partition("@")[2] or np.nan), "p": p}
@@ -141,9 +145,9 @@ def line_of(one: Mapping[str, Any]) -> str:
         return f"{one['index']:4d} {one['flown']:14} {one['family']:12} {one['cause']} ERROR {one['error']}"
     mark = "  " if one["first"] == one["cause"] else "! " if is_confidently_wrong(one) else "? "
     true = f"{one['cause']}@{one['time']:.1f} ({', '.join(f'{z:.2g}' for z in one['values'])})"
-    told = f"{one['verdict']} {one['first']}@{one['began']:.1f} {one['p']:.2f} {one['seconds']:.0f} s"
+    reported = f"{one['verdict']} {one['first']}@{one['began']:.1f} {one['p']:.2f} {one['seconds']:.0f} s"
     distance = f"D {one['D']:.0f} ({one['rival']})"
-    return f"{mark}{one['index']:4d} {one['flown']:14} {one['family']:12} {true} {distance} → {told}"
+    return f"{mark}{one['index']:4d} {one['flown']:14} {one['family']:12} {true} {distance} → {reported}"
 
 
 def table(results: Sequence[Mapping[str, Any]]) -> str:

@@ -75,9 +75,11 @@ def is_right_as_told(one: Result) -> bool:
     """Say whether the most probable hypothesis is true as it is meant: it stands for itself with or without further
     causes that the record cannot show (`probability.folded`), so that true ones with D < 16 may be missing beside it.
     """
-    told = set(first(one)[0].split(" + "))
+    reported = set(first(one)[0].split(" + "))
     shown = {name for name, d in one["D"].items() if d >= CLEAR}
-    return is_right(one) or (not one["strange"] and bool(told & hidden(one)) and shown <= told <= hidden(one))
+    return is_right(one) or (
+        not one["strange"] and bool(reported & hidden(one)) and shown <= reported <= hidden(one)
+    )
 
 
 def smallest_D(one: Result) -> float:
@@ -87,17 +89,17 @@ def smallest_D(one: Result) -> float:
 
 def names(one: Result) -> set[str]:
     """Return the causes that are named; with @ behind what begins in mid-trial."""
-    return {told(cause) for cause in one["causes"]}
+    return {reported(cause) for cause in one["causes"]}
 
 
-def told(cause: Result) -> str:
+def reported(cause: Result) -> str:
     """Return the name of a cause; with @ behind it if it begins in mid-trial."""
     return cause["id"] + ("@" if cause.get("start") is not None else "")
 
 
 def wrongly_sure(one: Result, sure: float = SURE) -> bool:
     """Say whether a wrong name is stated with certainty."""
-    return any(cause["p"] >= sure and told(cause) not in hidden(one) for cause in one["causes"])
+    return any(cause["p"] >= sure and reported(cause) not in hidden(one) for cause in one["causes"])
 
 
 def of(results: Iterable[Result], *kinds: str) -> list[Result]:
@@ -174,7 +176,7 @@ def errors(results: Sequence[Result]) -> tuple[list[float], list[float], list[bo
         for cause in one["causes"]:
             for (value, low, high, sd), true in zip(cause["parameters"].values(), one["truth"].get(cause["id"], ()),
                                                     strict=False):  # fmt: skip
-                if told(cause) in hidden(one) and true:
+                if reported(cause) in hidden(one) and true:
                     off.append(abs(value - true) / abs(true))
                     stated.append(sd / abs(true))
                     covered.append(low <= true <= high)

@@ -152,8 +152,8 @@ def advice(results: Sequence[Result]) -> str:
     ]
     share = f"**{len(good)} of {len(able)}** pairs that a trial of the library can decide are decided (target: 80 %)."
     left = [f"{one['index']} ({one['skipped']})" for one in results if "skipped" in one]
-    told = f"\n\nNot counted: {', '.join(left)}." if left else ""
-    return f"## The next trial\n\n{ADVICE_WORDS}\n\n{share}\n\n" + table(header, body) + told
+    reported = f"\n\nNot counted: {', '.join(left)}." if left else ""
+    return f"## The next trial\n\n{ADVICE_WORDS}\n\n{share}\n\n" + table(header, body) + reported
 
 
 def times(results: Sequence[Result], alone: Sequence[Row]) -> str:

@@ -51,7 +51,7 @@ class Told(NamedTuple):
         return (self.verdict, self.first) != (other.verdict, other.first) or apart
 
 
-def told(case: tuple[str, int, str | None], changes: Mapping[str, Value]) -> Told:
+def reported(case: tuple[str, int, str | None], changes: Mapping[str, Value]) -> Told:
     """Return what is told of a case with some settings changed."""
     import subzero
     from subzero.diagnosis.inference import settings
@@ -136,9 +136,11 @@ def main() -> None:
                 (pair.split("=") for pair in asked.together.split(",") if pair)}  # fmt: skip
     print(f"{'setting':<42}{'runs':>6}  other verdicts", flush=True)
     with ProcessPoolExecutor(asked.workers, mp_context=get_context("spawn")) as pool:
-        plain = list(pool.map(told, cases, [{}] * len(cases)))
+        plain = list(pool.map(reported, cases, [{}] * len(cases)))
         for words, changes in variants([name for name in asked.names.split(",") if name], together):
-            print(row(words, list(pool.map(told, cases, [changes] * len(cases))), plain, cases), flush=True)
+            print(
+                row(words, list(pool.map(reported, cases, [changes] * len(cases))), plain, cases), flush=True
+            )
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ class Shared:
             self.runs.popitem(last=False)
         return self.runs[key]
 
-    def told(self, work: Findings, *more: Any) -> Verdict:
+    def reported(self, work: Findings, *more: Any) -> Verdict:
         """As `conclude`, and keep the work."""
         self.work = work
         return self.tell(work, *more)
@@ -49,7 +49,7 @@ def share(threads: int | None = None) -> Shared:
         patch: Any = module
         patch.simulate_track = shared.tracked
     patch = engine
-    patch.conclude = shared.told
+    patch.conclude = shared.reported
     for module in (problem, model_fits) if threads is not None else ():
         patch = module
         patch.cpu_count = lambda: threads

@@ -39,5 +39,5 @@ def _off(made: Made, unknown: Unknown) -> float:
     else:
         assert strange.force is not None
         true = history_at(strange.force, times)[:, AXES.index(strange.axis)]
-    told = np.interp(times, unknown.time, unknown.force)
-    return float(np.sqrt(np.mean((told - true) ** 2)) / np.abs(true).max())
+    reported = np.interp(times, unknown.time, unknown.force)
+    return float(np.sqrt(np.mean((reported - true) ** 2)) / np.abs(true).max())

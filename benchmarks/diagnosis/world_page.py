@@ -110,7 +110,7 @@ def _scores(found: Mapping[str, Rows]) -> str:
     return table(["figure", "value", "95 % interval", "records", "target", ""], body)
 
 
-def is_clear(one: Mapping[str, Any]) -> bool:
+def excludes_physics(one: Mapping[str, Any]) -> bool:
     """Say whether a record has a cause that should be named."""
     return bool(one["D"]) and min(one["D"].values()) >= world.CLEAR
 
@@ -118,7 +118,7 @@ def is_clear(one: Mapping[str, Any]) -> bool:
 def of_world(results: Rows) -> list[Score]:
     """Return the figures of healthy records and single causes, over all families."""
     healthy = [one for one in results if not one["cause"]]
-    clear = [one for one in results if is_clear(one)]
+    clear = [one for one in results if excludes_physics(one)]
     stated = np.array([one["p"] for one in results])
     right = np.array([float(world.is_right(one)) for one in results])
     error = scores.calibration_error(stated, right)[1] if results else 0.0
@@ -185,8 +185,8 @@ def of_jitter(results: Rows) -> list[Score]:
 
 def of_calibration(results: Rows) -> list[Score]:
     """Return how many intervals of calibrations hold the truth."""
-    told = [one for one in results if "numbers" in one and calibration.is_told(one)]
-    numbers = [row for one in told for row in one["numbers"].values()]
+    reported = [one for one in results if "numbers" in one and calibration.is_reported(one)]
+    numbers = [row for one in reported for row in one["numbers"].values()]
     words = "calibration: intervals of 95 % hold the truth"
     return [share(words, numbers, lambda one: bool(one["held"]), "93 … 97 %", least=0.93, most=0.97)]
 
@@ -196,7 +196,10 @@ def _families(results: Rows) -> str:
     body = []
     for name in (*world.FAMILIES, "all"):
         own = [one for one in results if name in (one["family"], "all")]
-        healthy, clear = [one for one in own if not one["cause"]], [one for one in own if is_clear(one)]
+        healthy, clear = (
+            [one for one in own if not one["cause"]],
+            [one for one in own if excludes_physics(one)],
+        )
         counts = [
             (world.is_right, healthy), (world.is_false_alarm, healthy),
             (world.is_right, clear), (world.is_confidently_wrong, own),
@@ -216,7 +219,7 @@ def _missed(results: Rows, errors: Rows) -> str:
         for one in sorted(results, key=lambda one: one["index"])
         if world.is_confidently_wrong(one)
         or world.is_false_alarm(one)
-        or (is_clear(one) and not world.is_right(one))
+        or (excludes_physics(one) and not world.is_right(one))
     ]
     missed += [
         data_errors.line_of(one) for one in sorted(errors, key=lambda one: one["index"]) if not one["named"]

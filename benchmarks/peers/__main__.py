@@ -80,9 +80,9 @@ class Bench:
         """Return what a call gives, and the median of its cost. [ms per second]"""
         result, times = call(), []
         for _ in range(self.repeats):
-            begun = process_time()
+            started = process_time()
             call()
-            times.append(process_time() - begun)
+            times.append(process_time() - started)
         return result, 1e3 * statistics.median(times) / seconds
 
     def some(self, settings):

@@ -26,8 +26,8 @@ def ramp_integral(x: float) -> float:
 def turned(t: float, total: float, start: float = 4.0, soft: float = 2.0) -> float:
     """Return an angle [rad] that turns by `total` [rad] at 6°/s from `start` on, with ends of `soft`. [s]."""
     rate = np.radians(6.0)
-    begun, ended = (t - start) / soft, (t - start - total / rate) / soft
-    return float(rate * soft * (ramp_integral(begun) - ramp_integral(ended)))
+    started, ended = (t - start) / soft, (t - start - total / rate) / soft
+    return float(rate * soft * (ramp_integral(started) - ramp_integral(ended)))
 
 
 def heading_for(pitch: float, heading: float) -> tuple[float, float, float]:

@@ -14,8 +14,8 @@ from cable.feng_allen.box_newton import (
     BoxWorkspace,
     NewtonReport,
     box_workspace,
+    reported,
     start_paper,
-    told,
 )
 from cable.feng_allen.equation7 import Equation7Numbers, angles_of, equation7_numbers, tangent
 from cable.feng_allen.printed_scheme import advance_paper, node_force
@@ -35,7 +35,7 @@ __all__ = [
     "box_workspace",
     "equation7_numbers",
     "node_force",
+    "reported",
     "start_paper",
     "tangent",
-    "told",
 ]

@@ -70,7 +70,7 @@ START = NewtonReport(CONVERGED, 0, 0.0, 0, 0)
 
 
 @inlined
-def told(report: NewtonReport) -> tuple[int, int, float, int, int]:
+def reported(report: NewtonReport) -> tuple[int, int, float, int, int]:
     """Return a report as compiled code may hand it to Python: a plain tuple, see `subzero.jit`."""
     return report.outcome, report.iterations, report.residual, report.node, report.row
 

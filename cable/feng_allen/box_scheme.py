@@ -82,7 +82,7 @@ def refuse_slack(w: BoxWorkspace, report: NewtonReport, ends: Ends, c: Equation7
 
 
 @compiled
-def begin_step(b: MovingBoxes, middle: Ends) -> bool:
+def start_step(b: MovingBoxes, middle: Ends) -> bool:
     """Keep y(t) in ``b.old``, after a cable of no length took the direction of motion; False: no motion."""
     w = b.boxes
     speed = w.y[0, 1]
@@ -131,7 +131,7 @@ def box_step(
         c: constants of equation (7).
     """
     w, a = b.boxes, 2.0 / (GAMMA * step)
-    if not begin_step(b, middle):
+    if not start_step(b, middle):
         return CONVERGED, 0, 0.0, 0, 0
     last, length = w.count[0] - 1, w.length[w.count[0] - 1]
     end_history = first_stage(b, a)

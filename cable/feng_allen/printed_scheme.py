@@ -27,9 +27,9 @@ from cable.feng_allen.box_newton import (
     BoxWorkspace,
     NewtonReport,
     copy_nodes,
+    reported,
     solve_boxes,
     start_paper,
-    told,
 )
 from cable.feng_allen.equation7 import Equation7Numbers, tangent
 from subzero.jit import compiled, inner
@@ -98,7 +98,7 @@ def paper_step(
     w: BoxWorkspace, step: float, ends: Ends, wound: float, implicit: bool, c: Equation7Numbers
 ) -> tuple[int, int, float, int, int]:
     """Take one step as `advance_paper`, called from Python; return the `NewtonReport` as a tuple."""
-    return told(advance_paper(w, step, ends, wound, implicit, c))
+    return reported(advance_paper(w, step, ends, wound, implicit, c))
 
 
 @compiled

@@ -70,8 +70,8 @@ def correct_for_arc(line: Line, led: bool, work: Load) -> None:
             speed += U[i] * U[i]
         line.slip[j] = 0.25 * slide
         in_plane = min(side * side / max(square * (speed - along * along), STILL), 1.0)
-        told = led and square * abs(along) > STILL
-        sliding = min(max(slide / (square * along), 0.0), 1.0) if told else 1.0
+        reported = led and square * abs(along) > STILL
+        sliding = min(max(slide / (square * along), 0.0), 1.0) if reported else 1.0
         oblique = along * along * square / max(side * side, STILL * STILL)
         line.normal_gain[j] = 1.0 + square * in_plane * _missing_gain(sliding, oblique)
 

@@ -35,7 +35,7 @@ from cable.moving_end.state import (
     NEW,
     NOW,
     Line,
-    feel_water,
+    sample_water,
 )
 from cable.moving_end.time_step import solve_step
 from cable.properties import CableNumbers
@@ -86,14 +86,14 @@ def hang(line: Line, water: Water, c: CableNumbers, work: Load) -> float:
             x = line.position[NOW]
             line.position[NEW, j, i] = x[0, i] + share * (x[N, i] - x[0, i])
             line.velocity[NEW, j, i] = 0.0
-    feel_water(line, water, line.ends.time)
+    sample_water(line, water, line.ends.time)
     for j in range(1, N + 1):
         _load_across(line, j, c, work)
         whole += _length(line, j)
     for _ in range(DRAG_ROUNDS):
         _close(line, F, c.compliance, whole)
         _lay(line, F, c.compliance)
-        feel_water(line, water, line.ends.time)
+        sample_water(line, water, line.ends.time)
         for j in range(1, N + 1):
             take_segment(line.position[NEW], line.velocity[NEW], line.water[NEW], j, work)
             work.square, work.chord_length, work.shorter = measured_chord(
@@ -321,7 +321,7 @@ def _guess(line: Line, water: Water, work: Load) -> None:
         for i in range(3):
             line.position[NEW, j, i] = line.position[NOW, j, i]
     line.ends.last_length[NEW] = line.ends.last_length[NOW]
-    feel_water(line, water, line.ends.time)
+    sample_water(line, water, line.ends.time)
     for j in range(line.ends.count + 1):
         for i in range(3):
             line.water[NOW, j, i] = line.water[NEW, j, i]

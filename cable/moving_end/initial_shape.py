@@ -10,7 +10,7 @@ from cable.current import Water
 from cable.drum import FREE, TURNING, DrumNumbers
 from cable.history import Equilibrium
 from cable.moving_end.segment_load import Load, segment_momentum
-from cable.moving_end.state import BEFORE, LONGEST, NEW, NOW, SPLIT_AT, Line, feel_water, spacing
+from cable.moving_end.state import BEFORE, LONGEST, NEW, NOW, SPLIT_AT, Line, sample_water, spacing
 from cable.properties import CableNumbers, CableProperties
 from cable.tow_path import first_direction
 from subzero.jit import compiled
@@ -107,7 +107,7 @@ def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, p
 @compiled
 def start_in_water(line: Line, water: Water, c: CableNumbers, work: Load) -> None:
     """Fill the water's velocity at the nodes and the segments' momenta, at all levels, from what moves at the start."""
-    feel_water(line, water, line.ends.time)
+    sample_water(line, water, line.ends.time)
     for level in (NOW, BEFORE):
         for j in range(line.ends.count + 1):
             for i in range(3):

@@ -288,7 +288,7 @@ def spacing(line: Line) -> float:
 
 
 @inner
-def feel_water(line: Line, water: Water, time: float) -> None:
+def sample_water(line: Line, water: Water, time: float) -> None:
     """Fill the water's velocity at the nodes of level NEW."""
     x, J, uniform = line.position[NEW], line.water[NEW], water.velocity
     if uniform.shape[0] == 1:

@@ -33,8 +33,8 @@ from cable.moving_end.state import (
     RESIDUAL,
     STEP,
     Line,
-    feel_water,
     held_node,
+    sample_water,
 )
 from cable.properties import CableNumbers
 from subzero.jit import compiled, inlined, inner, scratch
@@ -179,10 +179,10 @@ def _predict(
     if not line.ends.layout.free_end:
         pull = max(line.node_tension[N], 0.0)
         line.tension[NEW, N] = max(pull + (line.tension[NOW, N] - pull) * last[NEW] / last[NOW], KNOWN)
-    feel_water(line, water, line.ends.time + step)
+    sample_water(line, water, line.ends.time + step)
     correct_for_arc(line, drum.control != FREE, work)
     if line.ends.solver.factored:
-        _give_way(line, gap)
+        _relax(line, gap)
 
 
 @inner
@@ -350,7 +350,7 @@ def impedance(line: Line, Z: np.ndarray) -> None:
 
 
 @compiled
-def _give_way(line: Line, gap: np.ndarray) -> None:
+def _relax(line: Line, gap: np.ndarray) -> None:
     """Move all of level NEW as the last matrix has it answer to a tow point that is moved by `gap` (3,). [m]."""
     step, L = line.rows[RESIDUAL], line.blocks[LOWER]
     for j in range(1, line.ends.count + 1):
@@ -374,5 +374,5 @@ def follow_tow(line: Line, tow: np.ndarray) -> bool:
     gap, at = scratch(1, 3)[0], line.position[NEW, 0]
     for i in range(3):
         gap[i], at[i] = tow[i] - at[i], tow[i]
-    _give_way(line, gap)
+    _relax(line, gap)
     return True

@@ -84,9 +84,9 @@ def fly(
     """
     _check(autopilot)
     sim = Simulator(scenario, tethered=tethered, model=model, sample_time=autopilot.sample_time)
-    told = sensors if isinstance(sensors, Sensors) else Sensors(sensors)
+    reported = sensors if isinstance(sensors, Sensors) else Sensors(sensors)
     autopilot.reset()
-    told.reset()
+    reported.reset()
     seen, trouble = sim.observation, ""
     goals = [(0.0, *_goal(wanted, 0.0, seen.heading)[:3])]
     samples = max(1, ceil(sim.trial.duration / sim.sample_time - 1e-9))
@@ -94,7 +94,7 @@ def fly(
         goal = _goal(wanted, seen.time, goals[-1][2])
         goals.append((seen.time, *goal[:3]))
         try:
-            seen = sim.step(_command(autopilot, told.read(seen), goal))
+            seen = sim.step(_command(autopilot, reported.read(seen), goal))
         except RunStoppedError:
             break  # the result tells it
         except AutopilotError:

@@ -51,27 +51,27 @@ class Program(ABC):
     size: float
     sample_time: float = 0.1
     name: str = "manoeuvre"
-    begun: Observation | None = field(default=None, init=False)
+    started: Observation | None = field(default=None, init=False)
     side: float = field(default=1.0, init=False)
 
     def reset(self) -> None:
         """Begin again."""
-        self.begun, self.side = None, 1.0
+        self.started, self.side = None, 1.0
 
     def update(self, reading: Observation, wanted: Wanted) -> Command:
         """Return the command for the next sample."""
         if reading.time < RUN_IN - 1e-9:
             return self.straight
-        self.begun = self.begun or reading
-        return self.after(reading, self.begun)
+        self.started = self.started or reading
+        return self.after(reading, self.started)
 
     @abstractmethod
-    def after(self, now: Observation, begun: Observation) -> Command:
+    def after(self, now: Observation, started: Observation) -> Command:
         """Return the command once the manoeuvre has begun."""
 
-    def turned(self, channel: str, now: Observation, begun: Observation) -> float:
+    def turned(self, channel: str, now: Observation, started: Observation) -> float:
         """Return how far an angle has changed, to the side of the rudder or planes [rad]; refuse an unknown one."""
-        change = self.side * (getattr(now, channel) - getattr(begun, channel))
+        change = self.side * (getattr(now, channel) - getattr(started, channel))
         if change != change:
             raise UserError(f"at t = {now.time:g} s the {channel} is not a number: no sensor measures it.")
         return float(change)
@@ -90,7 +90,7 @@ class Program(ABC):
 class TurningCircle(Program):
     """The rudder put over, and kept."""
 
-    def after(self, now: Observation, begun: Observation) -> Command:
+    def after(self, now: Observation, started: Observation) -> Command:
         """Return the rudder over."""
         return self.with_rudder(self.size)
 
@@ -98,9 +98,9 @@ class TurningCircle(Program):
 class ZigZag(Program):
     """The rudder reversed each time the heading has changed by as much as the rudder."""
 
-    def after(self, now: Observation, begun: Observation) -> Command:
+    def after(self, now: Observation, started: Observation) -> Command:
         """Return the rudder on its present side."""
-        if self.turned("heading", now, begun) >= abs(self.size):
+        if self.turned("heading", now, started) >= abs(self.size):
             self.side = -self.side
         return self.with_rudder(self.side * self.size)
 
@@ -108,9 +108,9 @@ class ZigZag(Program):
 class VerticalZigZag(Program):
     """The planes reversed each time the pitch has changed by as much as the planes."""
 
-    def after(self, now: Observation, begun: Observation) -> Command:
+    def after(self, now: Observation, started: Observation) -> Command:
         """Return the planes on their present side."""
-        if self.turned("pitch", now, begun) >= abs(self.size):
+        if self.turned("pitch", now, started) >= abs(self.size):
             self.side = -self.side
         return self.with_planes(self.side * self.size)
 
@@ -141,16 +141,16 @@ SPIRAL_HOLD = 6.0
 class Spiral(Program):
     """Dieudonné's spiral: rudders in steps from one side to the other and back, each until the turn is steady."""
 
-    def after(self, now: Observation, begun: Observation) -> Command:
+    def after(self, now: Observation, started: Observation) -> Command:
         """Return the rudder of the present step."""
-        step = int((now.time - begun.time + 1e-9) / SPIRAL_HOLD)
+        step = int((now.time - started.time + 1e-9) / SPIRAL_HOLD)
         return self.with_rudder(self.size * SPIRAL_SHARES[min(step, len(SPIRAL_SHARES) - 1)])
 
 
 class CrashStop(Program):
     """The propeller full astern."""
 
-    def after(self, now: Observation, begun: Observation) -> Command:
+    def after(self, now: Observation, started: Observation) -> Command:
         """Return the propeller astern, the fins as they were."""
         n, *fins = self.straight
         return (-self.size * n, *fins)  # type: ignore[return-value]

@@ -119,8 +119,8 @@ class Sensors:
 
     def read(self, seen: Observation) -> Observation:
         """Return what the sensors tell now; NaN for channels that have none. (Clocks are exact.)"""
-        told = {sensor.sensor.channel: sensor.read(seen) for sensor in self._running}
-        return UNKNOWN._replace(time=seen.time, **told)
+        reported = {sensor.sensor.channel: sensor.read(seen) for sensor in self._running}
+        return UNKNOWN._replace(time=seen.time, **reported)
 
 
 class _Running:
@@ -132,15 +132,15 @@ class _Running:
         self._rng = np.random.default_rng([seed, own])
         self._next, self._last_time, self._walk = -math.inf, math.nan, 0.0
         self._waiting: deque[tuple[float, float]] = deque()
-        self._told = math.nan
+        self._reported = math.nan
 
     def read(self, seen: Observation) -> float:
         """Return the newest sample that has arrived."""
         if seen.time >= self._next - GRACE:
             self._take(seen)
         while self._waiting and self._waiting[0][0] <= seen.time + GRACE:
-            self._told = self._waiting.popleft()[1]
-        return self._told
+            self._reported = self._waiting.popleft()[1]
+        return self._reported
 
     def _take(self, seen: Observation) -> None:
         """Take a sample, and set the time of the next; the first one is delivered at once, and never dropped."""
@@ -149,7 +149,7 @@ class _Running:
         sample = self._sample(getattr(seen, self.sensor.channel), passed)
         lost = self._rng.random() < self.sensor.drop_out
         if first:
-            self._told, self._next = sample, seen.time
+            self._reported, self._next = sample, seen.time
         elif not lost:
             self._waiting.append((seen.time + self.sensor.delay, sample))
         self._last_time = seen.time

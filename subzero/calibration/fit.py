@@ -35,7 +35,7 @@ from subzero.diagnosis.inference import (
     quadratic_step,
     runnable,
     with_finer_steps,
-    with_noise_behind,
+    with_residual_noise,
 )
 
 HORIZONS = ((0.3, 0.6, 1.0), (0.1, 0.2, 0.35, 0.6, 1.0))
@@ -106,7 +106,7 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
     fit = _settled(problem, first, D)
     for round in range(MAX_NOISE_ROUNDS):
         progress(0.6 + 0.1 * round, "noise behind the fit")
-        again = with_noise_behind(problem, fit.z, D)
+        again = with_residual_noise(problem, fit.z, D)
         if again is None:
             break
         problem = again

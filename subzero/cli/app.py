@@ -26,8 +26,8 @@ from cyclopts import Parameter
 import scenarios
 from subzero.cli import autopilot, diagnosis, import_log, install, sweep, trials
 from subzero.cli.examples import EXAMPLES, register
-from subzero.cli.interrupts import INTERRUPTED, reset, say_interrupted, was_interrupted
-from subzero.cli.output_mode import COMMAND, NOT_STRICT, PLAIN, StrictVoice, Voice, speak
+from subzero.cli.interrupts import INTERRUPTED, print_interrupted, reset, was_interrupted
+from subzero.cli.output_mode import COMMAND, NOT_STRICT, PLAIN, OutputMode, StrictOutputMode, set_output_mode
 from subzero.errors import DISTRIBUTION, UserError, nearest, printable
 
 if TYPE_CHECKING:
@@ -153,18 +153,18 @@ class Kept:
         where = printable(str(kept.folder))
 
         def left() -> str:
-            time = kept.stands_at()
+            time = kept.kept_until()
             if time is None:
                 return "nothing was kept yet"
             return f"the run up to t = {time:g} s is kept in {where}; the same command goes on from there"
 
         set_exit_message(left)
-        if (time := kept.stands_at()) is not None:
+        if (time := kept.kept_until()) is not None:
             print(f"Going on from t = {time:g} s, which is kept in {where}.", file=sys.stderr)
         try:
             yield {"checkpoint": kept}
         except BaseException:
-            if kept.stands_at() is None:
+            if kept.kept_until() is None:
                 kept.remove()
             raise
         kept.remove()
@@ -196,7 +196,7 @@ def simulate(
     kept: Kept = ALL_KEPT,
     check: Flag = False,
     outputs: Outputs = USUAL_OUTPUTS,
-    voice: StrictVoice = NOT_STRICT,
+    output_mode: StrictOutputMode = NOT_STRICT,
 ) -> int:
     """Simulate one run, and write its channels, a summary and figures.
 
@@ -207,7 +207,7 @@ def simulate(
         kept: what is kept of it, and where.
         check: run it once more with half the steps and half the segment length, and say what changes.
         outputs: which files are made, and how.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     from subzero.cli import write_results
     from subzero.results.netcdf_csv import open_output_folder
@@ -226,7 +226,13 @@ def simulate(
         runs = _refined(runs, trial, extended) if check else runs
         summary = write_results.write_all(runs, None, output_folder, **outputs.kinds(), float64=kept.float64)
         write_results.write_film(outputs.animate, output_folder)
-    return FINE if write_results.tell(summary, output_folder, strict=voice.strict, voice=voice) else STOPPED
+    return (
+        FINE
+        if write_results.print_results(
+            summary, output_folder, strict=output_mode.strict, output_mode=output_mode
+        )
+        else STOPPED
+    )
 
 
 def compare(
@@ -238,7 +244,7 @@ def compare(
     kept: Kept = ALL_KEPT,
     check: Flag = False,
     outputs: Outputs = USUAL_OUTPUTS,
-    voice: StrictVoice = NOT_STRICT,
+    output_mode: StrictOutputMode = NOT_STRICT,
 ) -> int:
     """Simulate with the cable and without, and set both side by side.
 
@@ -249,7 +255,7 @@ def compare(
         kept: what is kept of it, and where.
         check: run both once more with half the steps and half the segment length, and say what changes.
         outputs: which files are made, and how.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     from subzero.cli import write_results
     from subzero.records.record import read_record
@@ -271,7 +277,13 @@ def compare(
             runs, result.measured, output_folder, **outputs.kinds(), float64=kept.float64
         )
         write_results.write_film(outputs.animate, output_folder)
-    return FINE if write_results.tell(summary, output_folder, strict=voice.strict, voice=voice) else STOPPED
+    return (
+        FINE
+        if write_results.print_results(
+            summary, output_folder, strict=output_mode.strict, output_mode=output_mode
+        )
+        else STOPPED
+    )
 
 
 def plot(
@@ -281,7 +293,7 @@ def plot(
     what: Annotated[list[str] | None, Parameter(consume_multiple=True, negative=())] = None,
     out: Path | None = None,
     format: Literal["png", "svg", "pdf"] = "png",
-    voice: Voice = PLAIN,
+    output_mode: OutputMode = PLAIN,
 ) -> int:
     """Draw a run from its file again: figures by name, or any channel over time.
 
@@ -290,7 +302,7 @@ def plot(
         what: tension, shape3d, motion, forces, attitude, cable; or channels, such as heading. Without it, all six.
         out: folder for the figures; by default the folder of the run.
         format: of the files.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     from subzero.files.atomic_output import open_output_folder
 
@@ -303,7 +315,7 @@ def plot(
         for name, figure in figures_of(dataset, what).items():
             with lacking_letters_as_boxes():
                 figure.savefig(output_folder.path / f"{run.stem}_{name}.{format}")
-    with voice.tells(output_folder.files()):
+    with output_mode.emit(output_folder.files()):
         print(output_folder.words())
     return FINE
 
@@ -314,7 +326,7 @@ def explore(
     *,
     port: int = 8642,
     no_browser: Annotated[bool, Parameter(negative=())] = False,
-    voice: Voice = PLAIN,
+    output_mode: OutputMode = PLAIN,
 ) -> int:
     """Open a page on this machine, with sliders that say at once what the trial would do otherwise.
 
@@ -322,7 +334,7 @@ def explore(
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         port: of the page's address, http://127.0.0.1:PORT; 0 is any that is free.
         no_browser: say the address, and open no browser.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     from subzero.cli.interrupts import set_exit_message
     from subzero.explore import page as explore_page
@@ -337,7 +349,7 @@ def explore(
         with _progress(trial) as progress:
             nominal = run(trial, progress=progress)
         page = explore_page.Page(Exploration(trial=trial, nominal=nominal, simulate=run))
-        with voice.tells({"url": access.url}):
+        with output_mode.emit({"url": access.url}):
             print(f"Exploring {printable(trial.name)} at {access.url} . Ctrl-C ends it.")
         sys.stdout.flush()
         set_exit_message(lambda: "the page is closed, and files that were saved stay")
@@ -363,8 +375,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     _note_command(sys.argv[1:] if arguments is None else arguments)
     try:
         command, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
-        voice = next((kwarg for kwarg in bound.kwargs.values() if isinstance(kwarg, Voice)), PLAIN)
-        with _aloud(voice):
+        output_mode = next((kwarg for kwarg in bound.kwargs.values() if isinstance(kwarg, OutputMode)), PLAIN)
+        with _aloud(output_mode):
             return command(*bound.args, **bound.kwargs) or FINE
     except cyclopts.CycloptsError as error:
         asked = " ".join(["subzero", *(error.command_chain or ())])
@@ -372,29 +384,29 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except UserError as error:
         return _refuse(str(error))
     except KeyboardInterrupt:
-        say_interrupted()
+        print_interrupted()
         return INTERRUPTED
     except Exception:  # matplotlib's drawing in C++ made a ValueError of an interrupt in a call back
         if not was_interrupted():
             raise
-        say_interrupted()
+        print_interrupted()
         return INTERRUPTED
 
 
 @contextmanager
-def _aloud(voice: Voice) -> Iterator[None]:
+def _aloud(output_mode: OutputMode) -> Iterator[None]:
     """Let a command speak as it was asked to; with --verbose, say what runs, and in the end how long it took."""
-    speak(voice)
+    set_output_mode(output_mode)
     began = perf_counter()
-    if voice.verbose:
+    if output_mode.verbose:
         import platform
 
         print(f"subzero {_version()}, Python {platform.python_version()}, {sys.executable}", file=sys.stderr)
     try:
         yield
     finally:
-        speak(PLAIN)
-        if voice.verbose:
+        set_output_mode(PLAIN)
+        if output_mode.verbose:
             print(f"{_effort()}{perf_counter() - began:.1f} s in all.", file=sys.stderr)
 
 

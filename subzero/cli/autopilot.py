@@ -13,7 +13,7 @@ from cyclopts import Parameter
 
 import scenarios
 from subzero.cli.examples import register
-from subzero.cli.output_mode import NOT_STRICT, StrictVoice
+from subzero.cli.output_mode import NOT_STRICT, StrictOutputMode
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -83,7 +83,7 @@ def manoeuvre(
     planes: float | None = None,
     speed: float = 1.0,
     out: Path | None = None,
-    voice: StrictVoice = NOT_STRICT,
+    output_mode: StrictOutputMode = NOT_STRICT,
 ) -> int:
     """Fly a manoeuvre with the cable and without, and measure it.
 
@@ -94,7 +94,7 @@ def manoeuvre(
         planes: size of a manoeuvre with the stern-planes, in degrees.
         speed: of the bare hull before it, in m/s.
         out: folder for the files; by default one named after the manoeuvre, here.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     trial = scenarios.load(scenario)  # a mistake in it answers at once
     from subzero.autopilot.manoeuvres import MANOEUVRES
@@ -107,7 +107,7 @@ def manoeuvre(
 
     meaning = f": {MANOEUVRES[name].meaning}" if name in MANOEUVRES else ""
     shown = MANOEUVRE_COMMANDS.get(name, ("heading", "rudder_command"))
-    return _deliver(trial, fly, out or Path(name), f"{name}{meaning}", shown, voice)
+    return _deliver(trial, fly, out or Path(name), f"{name}{meaning}", shown, output_mode)
 
 
 def fly_step(
@@ -118,7 +118,7 @@ def fly_step(
     size: float | None = None,
     speed: float = 1.0,
     out: Path | None = None,
-    voice: StrictVoice = NOT_STRICT,
+    output_mode: StrictOutputMode = NOT_STRICT,
 ) -> int:
     """Let an autopilot follow a step, with the cable and without, and measure it.
 
@@ -129,7 +129,7 @@ def fly_step(
         size: of the step, in degrees, m or m/s.
         speed: to hold, in m/s.
         out: folder for the files; by default one named after the step, here.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     trial = scenarios.load(scenario)  # a mistake in it answers at once
     from subzero.autopilot.steps import step as run
@@ -148,7 +148,7 @@ def fly_step(
     cable = "not fed forward" if pilot.feed_forward == "none" else f"fed forward by {pilot.feed_forward}"
     title = f"{name.replace('_', ' ').capitalize()}: autopilot {pilot.autopilot}, the cable {cable}"
     shown = STEP_COMMANDS.get(name, ("heading", "rudder_command"))
-    return _deliver(trial, fly, out or Path(name), title, shown, voice)
+    return _deliver(trial, fly, out or Path(name), title, shown, output_mode)
 
 
 def add_to(app: cyclopts.App) -> None:
@@ -174,7 +174,7 @@ def _deliver(
     folder: Path,
     title: str,
     shown: tuple[str, str],
-    voice: StrictVoice,
+    output_mode: StrictOutputMode,
 ) -> int:
     """Fly with the cable and without, write and tell; return the exit code."""
     from subzero.autopilot import AutopilotWarning
@@ -191,7 +191,7 @@ def _deliver(
                 with progress_bar(f"Flying {trial.name}, {label}", lambda: costs_of(trial)) as progress:
                     measured[label] = fly(label, progress)
         summary = write_flights.write(measured, title, *shown, output_folder)
-    stopped = write_flights.tell(summary, list(measured), output_folder, voice)
+    stopped = write_flights.print_flights(summary, list(measured), output_folder, output_mode)
     for message in stopped:
         print(message, file=sys.stderr)
-    return STOPPED if stopped or (voice.strict and refuse_warnings(summary)) else FINE
+    return STOPPED if stopped or (output_mode.strict and refuse_warnings(summary)) else FINE

@@ -13,8 +13,8 @@ from cyclopts import Parameter
 
 import scenarios
 from subzero.cli.examples import register
-from subzero.cli.interrupts import INTERRUPTED, patience, say_interrupted
-from subzero.cli.output_mode import PLAIN, Voice
+from subzero.cli.interrupts import INTERRUPTED, patience, print_interrupted
+from subzero.cli.output_mode import PLAIN, OutputMode
 from subzero.cli.progress import progress_bar
 from subzero.errors import UserError, printable
 
@@ -89,7 +89,7 @@ def diagnose(
     effects: Path | None = None,
     commands: Literal["record", "scenario"] | None = None,
     search: Search = FULL_SEARCH,
-    voice: Voice = PLAIN,
+    output_mode: OutputMode = PLAIN,
 ) -> int:
     """Say what the simulation gets wrong in measured records, name the cause, extend the model and measure the gain.
 
@@ -101,7 +101,7 @@ def diagnose(
         effects: Python file with causes of your own (EFFECTS = [...]), besides the catalogue.
         commands: whose commands hold if the record and the scenario differ.
         search: how it is searched.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     from subzero.results.netcdf_csv import open_output_folder
 
@@ -114,13 +114,15 @@ def diagnose(
         from subzero.cli import write_diagnosis
 
         with patience(LAST_WORDS_S):
-            verdict = _ask(logged, own, search, voice)
+            verdict = _ask(logged, own, search, output_mode)
             write_diagnosis.write_all(
                 verdict, logged, output_folder, run=simulated, effects=own, effects_file=effects
             )
-    write_diagnosis.tell(verdict, output_folder, scenario=logged[0].setting.trial.source, voice=voice)
+    write_diagnosis.print_diagnosis(
+        verdict, output_folder, scenario=logged[0].setting.trial.source, output_mode=output_mode
+    )
     if not verdict.complete:
-        say_interrupted("Interrupted; what it has is written.")
+        print_interrupted("Interrupted; what it has is written.")
     return FINE if verdict.complete else INTERRUPTED
 
 
@@ -133,7 +135,7 @@ def calibrate(
     out: Path = Path("my_vehicle.toml"),
     commands: Literal["record", "scenario"] | None = None,
     estimation: Estimation = ALL_USUAL,
-    voice: Voice = PLAIN,
+    output_mode: OutputMode = PLAIN,
 ) -> int:
     """Estimate numbers of a vehicle from measured records, all at once, and write the vehicle they make.
 
@@ -144,10 +146,10 @@ def calibrate(
         out: file of the calibrated vehicle; figures and a JSON file go beside it.
         commands: whose commands hold if the record and the scenario differ.
         estimation: what is estimated.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     from subzero.calibration.numbers import full_name
-    from subzero.cli.write_calibration import files_of, tell, write_all
+    from subzero.cli.write_calibration import files_of, print_calibration, write_all
     from subzero.files.atomic_output import open_output_folder
 
     names = files_of(out)
@@ -161,7 +163,7 @@ def calibrate(
         with progress_bar("Calibrating", lambda: COSTS) as progress:
             found = run(logged, free=wanted, vehicle=vehicle, progress=progress, quick=estimation.quick)
         write_all(found, output_folder, out.stem)
-    tell(found, output_folder, out, voice=voice)
+    print_calibration(found, output_folder, out, output_mode=output_mode)
     return NO_CALIBRATION if found.refused else FINE
 
 
@@ -171,7 +173,7 @@ def challenge(
     seed: int = 0,
     out: Path = Path("hidden"),
     reveal: Path | None = None,
-    voice: Voice = PLAIN,
+    output_mode: OutputMode = PLAIN,
 ) -> int:
     """Hide an effect in a record, to find it with "subzero diagnose"; --reveal tells afterwards what it was.
 
@@ -180,13 +182,13 @@ def challenge(
         seed: draws the effect, its size, and every number within its tolerance.
         out: folder for the record.
         reveal: folder of a challenge, to be told what is hidden in it.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     if reveal is not None:
-        from subzero.synthetic.sealed_answer import reveal as told
+        from subzero.synthetic.sealed_answer import reveal as reported
 
-        answer = told(reveal)
-        with voice.tells({"answer": answer}):
+        answer = reported(reveal)
+        with output_mode.emit({"answer": answer}):
             print(answer)
         return FINE
     scenarios.load(scenario)
@@ -195,7 +197,7 @@ def challenge(
 
     with open_output_folder(out) as output_folder, progress_bar("Hiding an effect"):
         hide(scenario, seed, output_folder.path)
-    with voice.tells(output_folder.files()):
+    with output_mode.emit(output_folder.files()):
         print(output_folder.words())
         print(f"Find it: subzero diagnose {scenario} {out / 'record.csv'}")
         print(f"Be told: subzero challenge --reveal {out}")
@@ -287,12 +289,12 @@ def simulated(setting: Setting) -> xr.Dataset:
     return simulate(trial, tethered=setting.tethered, model=setting.model, later=setting.later)
 
 
-def _ask(logged: list[Logged], own: tuple[Effect, ...], search: Search, voice: Voice) -> Verdict:
+def _ask(logged: list[Logged], own: tuple[Effect, ...], search: Search, output_mode: OutputMode) -> Verdict:
     """Diagnose under a progress bar; an interrupt ends it with what it has, if it has anything."""
-    from subzero.cli.write_diagnosis import tell_before
+    from subzero.cli.write_diagnosis import print_plan
     from subzero.diagnosis.api import diagnose_trials
 
-    seen = None if voice.as_json or voice.quiet else tell_before
+    seen = None if output_mode.as_json or output_mode.quiet else print_plan
     with progress_bar("Diagnosing", lambda: COSTS) as progress:
         return diagnose_trials(
             logged, effects=own, progress=progress, seed=search.seed, budget=search.budget, seen=seen

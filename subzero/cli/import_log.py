@@ -9,7 +9,7 @@ import cyclopts
 from cyclopts import Parameter
 
 from subzero.cli.examples import register
-from subzero.cli.output_mode import PLAIN, Voice
+from subzero.cli.output_mode import PLAIN, OutputMode
 from subzero.errors import UserError, printable
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def import_(
     map: Path | None = None,
     out: Path = Path("record.csv"),
     map_out: Path | None = None,
-    voice: Voice = PLAIN,
+    output_mode: OutputMode = PLAIN,
 ) -> int:
     """Make records of logs as their loggers wrote them: names, units and times found, and every change said.
 
@@ -36,7 +36,7 @@ def import_(
         map: TOML file that says which column is which channel, in which unit; found from names and values without it.
         out: the record; its map goes there too, as NAME.map.toml. With several logs a folder, for one record of each.
         map_out: write the map to this file, and no record: to edit it, and give it again with --map.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     from subzero.logs.api import import_log, undecided
 
@@ -47,9 +47,9 @@ def import_(
         raise undecided(open_ones[0])
     folder = map_out.parent if map_out is not None else targets[0].parent
     written = _written(found, targets, folder, map_out)
-    with voice.tells({**written, "logs": [_as_json(log) for log in found]}):
+    with output_mode.emit({**written, "logs": [_as_json(log) for log in found]}):
         for log in found:
-            _tell(log)
+            _print(log)
         print(f"Wrote {', '.join(printable(str(folder / name)) for name in written['files'])}")
     return FINE
 
@@ -103,7 +103,7 @@ def _written(
     return output.files()
 
 
-def _tell(found: Imported) -> None:
+def _print(found: Imported) -> None:
     """Print a line for each column, and what was done."""
     rows = [HEADINGS, *found.table()]
     widths = [max(len(printable(row[at])) for row in rows) for at in range(4)]

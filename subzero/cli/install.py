@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import cyclopts
 
 from subzero.cli.examples import register
-from subzero.cli.output_mode import PLAIN, Voice
+from subzero.cli.output_mode import PLAIN, OutputMode
 from subzero.errors import DISTRIBUTION, printable
 
 if TYPE_CHECKING:
@@ -53,14 +53,14 @@ class Check(NamedTuple):
         return self.error <= self.allowed
 
 
-def doctor(*, voice: Voice = PLAIN) -> int:
+def doctor(*, output_mode: OutputMode = PLAIN) -> int:
     """Say what is installed, where machine code is kept, and whether this machine computes what is known exactly.
 
     Three self-checks take some ten seconds: the straight pull of equation (37), a hanging chain, and the energy balance
     of a run. If one is off, the exit code is 3.
 
     Args:
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     from subzero.cli.progress import progress_bar
 
@@ -76,16 +76,16 @@ def doctor(*, voice: Voice = PLAIN) -> int:
         "machine_code": _machine_code(),
         "checks": [check._asdict() | {"fine": check.is_fine} for check in checks],
     }
-    with voice.tells(about):
-        _tell(about, checks)
+    with output_mode.emit(about):
+        _print(about, checks)
     return FINE if all(check.is_fine for check in checks) else STOPPED
 
 
-def warm(*, voice: Voice = PLAIN) -> int:
+def warm(*, output_mode: OutputMode = PLAIN) -> int:
     """Compile what a comparison such as "subzero compare fig6" uses, once, so that later commands start at once.
 
     Args:
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     import warnings
 
@@ -106,8 +106,8 @@ def warm(*, voice: Voice = PLAIN) -> int:
             warnings.simplefilter("ignore")
             draw(runs)["fig6"].canvas.draw()  # matplotlib looks for its fonts
     seconds, kept = perf_counter() - began, _machine_code()
-    told = {"compiled": compiled_functions(), "seconds": round(seconds, 1), **kept}
-    with voice.tells(told):
+    reported = {"compiled": compiled_functions(), "seconds": round(seconds, 1), **kept}
+    with output_mode.emit(reported):
         if compiled_functions():
             print(
                 f"Compiled {compiled_functions()} functions in {seconds:.0f} s; they are kept in {kept['folder']}."
@@ -231,7 +231,7 @@ def _off(found: np.ndarray, exact: np.ndarray) -> float:
     return float(abs(found - exact).max() / abs(exact).max())
 
 
-def _tell(about: dict[str, Any], checks: list[Check]) -> None:
+def _print(about: dict[str, Any], checks: list[Check]) -> None:
     """Print what was found."""
     from rich.console import Console
     from rich.markup import escape
@@ -250,7 +250,7 @@ def _tell(about: dict[str, Any], checks: list[Check]) -> None:
             for name, lacks in about["extras_missing"].items()
         ),
         *(
-            (check.name, f"error {check.error:.1e}, allowed {check.allowed:.0e}: {_word(check)}")
+            (check.name, f"error {check.error:.1e}, allowed {check.allowed:.0e}: {_status(check)}")
             for check in checks
         ),
     ]
@@ -259,7 +259,7 @@ def _tell(about: dict[str, Any], checks: list[Check]) -> None:
     Console(highlight=False).print(table)
 
 
-def _word(check: Check) -> str:
+def _status(check: Check) -> str:
     return (
         "fine" if check.is_fine else "OFF. Do not trust results of this machine; report it with this output."
     )

@@ -85,7 +85,7 @@ def set_exit_message(message: Callable[[], str]) -> None:
     _exit_message[:] = [message]
 
 
-def say_interrupted(words: str = "") -> None:
+def print_interrupted(words: str = "") -> None:
     """Say the last words of an interrupted command, once: by default what became of its files."""
     if _last_words.acquire(blocking=False):
         with suppress(OSError, ValueError):  # nothing reads standard error any more
@@ -117,7 +117,7 @@ def _end_late(woken: socket.socket, waker: socket.socket) -> None:
             woken.recv(1)
         if output := sys.modules.get("subzero.files.atomic_output"):
             output.remove_temporary()
-        _say_in_time(lambda: say_interrupted(f"\nInterrupted; {_state()}."))  # a progress line may be open
+        _say_in_time(lambda: print_interrupted(f"\nInterrupted; {_state()}."))  # a progress line may be open
     finally:
         os._exit(INTERRUPTED)
 

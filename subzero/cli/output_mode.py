@@ -20,7 +20,7 @@ COMMAND: ContextVar[str] = ContextVar("COMMAND", default="")
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class Voice:
+class OutputMode:
     """How the command speaks.
 
     Attributes:
@@ -35,7 +35,7 @@ class Voice:
     verbose: Annotated[bool, Parameter(name=("--verbose", "-v"), negative=())] = False
 
     @contextmanager
-    def tells(self, result: Mapping[str, Any]) -> Iterator[None]:
+    def emit(self, result: Mapping[str, Any]) -> Iterator[None]:
         """Let what is printed inside be read; with --json the result instead, with --quiet nothing.
 
         Args:
@@ -53,7 +53,7 @@ class Voice:
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
-class StrictVoice(Voice):
+class StrictOutputMode(OutputMode):
     """How a command that runs trials speaks, and what it makes of warnings.
 
     Attributes:
@@ -63,15 +63,15 @@ class StrictVoice(Voice):
     strict: Annotated[bool, Parameter(negative=())] = False
 
 
-PLAIN, NOT_STRICT = Voice(), StrictVoice()
-_VOICE: ContextVar[Voice] = ContextVar("VOICE", default=PLAIN)
+PLAIN, NOT_STRICT = OutputMode(), StrictOutputMode()
+_VOICE: ContextVar[OutputMode] = ContextVar("VOICE", default=PLAIN)
 
 
-def voice_of_command() -> Voice:
+def output_mode_of_command() -> OutputMode:
     """Return how the command that is carried out was asked to speak."""
     return _VOICE.get()
 
 
-def speak(voice: Voice) -> None:
+def set_output_mode(output_mode: OutputMode) -> None:
     """Let the command that is carried out speak so."""
-    _VOICE.set(voice)
+    _VOICE.set(output_mode)

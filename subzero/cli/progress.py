@@ -13,7 +13,7 @@ from time import monotonic
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from subzero.cli.output_mode import voice_of_command
+from subzero.cli.output_mode import output_mode_of_command
 from subzero.errors import printable
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ STANDSTILL_S = 20.0
 """Work that has not moved for so long is told to stand still; so long is a rate watched before it counts. [s]"""
 LONG_S = 3600.0
 """Work that will take longer than this is told. [s]"""
-LOOK_S = 1.0
+CHECK_S = 1.0
 """So often the thread looks. [s]"""
 
 
@@ -43,7 +43,7 @@ def progress_bar(words: str, costs: Callable[[], str] = str) -> ProgressBar:
 
     from subzero.jit.machine_code import before_compiling
 
-    console = Console(stderr=True, highlight=False, quiet=voice_of_command().quiet)
+    console = Console(stderr=True, highlight=False, quiet=output_mode_of_command().quiet)
     before_compiling(lambda: console.print(COMPILING))
     return ProgressBar(words, console, costs)
 
@@ -63,7 +63,7 @@ class ProgressBar:
         self._words, self._console, self._costs = words, console, costs
         self._bar: Progress | None = None
         self._fraction, self._begun, self._moved = 0.0, monotonic(), monotonic()
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
         self._counting, self._made, self._opening = False, -1, threading.Lock()
         self._ended = threading.Event()
 
@@ -77,24 +77,24 @@ class ProgressBar:
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=fraction, description=self._words)
 
-    def look(self) -> None:
+    def check(self) -> None:
         """Tell if the work stands still, or if its rate so far means hours; each once."""
         now = monotonic()
         if _compiling():
-            self._begun, self._moved = self._begun + LOOK_S, now
+            self._begun, self._moved = self._begun + CHECK_S, now
             self._count()
             return
         self._end_count()
         ran = now - self._begun
         left = ran * (1.0 / self._fraction - 1.0) if self._fraction > 0.0 else 0.0
         if now - self._moved >= STANDSTILL_S:
-            self._tell("still", f"has not moved on for {now - self._moved:.0f} s")
+            self._notify("still", f"has not moved on for {now - self._moved:.0f} s")
         elif ran >= STANDSTILL_S and left > LONG_S:
-            self._tell("long", f"will take about {left / 3600.0:.2g} hours more at this rate")
+            self._notify("long", f"will take about {left / 3600.0:.2g} hours more at this rate")
 
-    def _tell(self, what: str, news: str) -> None:
-        if what not in self._told:
-            self._told.add(what)
+    def _notify(self, what: str, news: str) -> None:
+        if what not in self._reported:
+            self._reported.add(what)
             line = f"{self._words} stands at {100.0 * self._fraction:.3g} % and {news}. {self._costs()}"
             self._console.print(
                 printable(line.rstrip()), soft_wrap=True, highlight=False, markup=False, emoji=False
@@ -140,8 +140,8 @@ class ProgressBar:
                 self._bar = bar
 
     def _watch(self) -> None:
-        while not self._ended.wait(LOOK_S):
-            self.look()
+        while not self._ended.wait(CHECK_S):
+            self.check()
 
     def __enter__(self) -> ProgressBar:
         _listen()

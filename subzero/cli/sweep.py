@@ -13,12 +13,12 @@ import cyclopts
 from cyclopts import Parameter
 
 from subzero.cli.examples import register
-from subzero.cli.output_mode import NOT_STRICT, StrictVoice
+from subzero.cli.output_mode import NOT_STRICT, StrictOutputMode
 from subzero.errors import UserError, missing_extra, printable, whole
 
 if TYPE_CHECKING:
     from subzero.files.atomic_output import OutputFolder
-    from subzero.sweeps.api import Standing
+    from subzero.sweeps.api import SweepProgress
 
 FINE, STOPPED = 0, 3
 
@@ -33,7 +33,7 @@ def sweep(
     workers: int | None = None,
     scheduler: str | None = None,
     retry: Flag = False,
-    voice: StrictVoice = NOT_STRICT,
+    output_mode: StrictOutputMode = NOT_STRICT,
 ) -> int:
     """Run a trial with many values of its parameters, and show what they do.
 
@@ -45,16 +45,16 @@ def sweep(
         workers: processes on this machine; by default one for each of its cores.
         scheduler: address of a Dask scheduler, such as tcp://host:8786, to run on its workers instead.
         retry: run members again that failed.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     if workers is not None and scheduler is not None:
         raise UserError("--workers are processes here, and --scheduler has its own. Leave out one of them.")
     with _executor(workers, scheduler) as executor:
         summary, output_folder = _swept(spec, out, executor, retry)
-    from subzero.cli.write_sweep import tell_sweep
+    from subzero.cli.write_sweep import print_sweep
 
-    tell_sweep(summary, output_folder, voice)
-    return STOPPED if summary["failed"] or (voice.strict and summary["warnings"]) else FINE
+    print_sweep(summary, output_folder, output_mode)
+    return STOPPED if summary["failed"] or (output_mode.strict and summary["warnings"]) else FINE
 
 
 def _swept(spec: Path, out: Path | None, executor: Any, retry: bool) -> tuple[dict[str, Any], OutputFolder]:
@@ -124,11 +124,11 @@ class _Bar:
     def __exit__(self, *error: Any) -> None:
         self._bar.__exit__(*error)
 
-    def __call__(self, standing: Standing) -> None:
+    def __call__(self, progress_now: SweepProgress) -> None:
         """Show how far it is."""
-        self._finished = standing.finished
-        words = _in_words(standing)
-        self._bar(standing.finished / standing.members, words)
+        self._finished = progress_now.finished
+        words = _in_words(progress_now)
+        self._bar(progress_now.finished / progress_now.members, words)
         if not sys.stderr.isatty() and monotonic() - self._said > LINE_EVERY_S:
             self._said = monotonic()
             print(words, file=sys.stderr)
@@ -140,15 +140,15 @@ class _Bar:
         )
 
 
-def _in_words(standing: Standing) -> str:
+def _in_words(progress_now: SweepProgress) -> str:
     """Return how far a sweep is, its rate, how long it will take, and how many members failed."""
-    parts = [f"{standing.finished} of {standing.members} members"]
-    if standing.rate > 0.0:
-        parts += [f"{standing.rate:.3g}/s", f"{_span(standing.seconds_left)} left"]
-    member, seconds = standing.slowest
+    parts = [f"{progress_now.finished} of {progress_now.members} members"]
+    if progress_now.rate > 0.0:
+        parts += [f"{progress_now.rate:.3g}/s", f"{_span(progress_now.seconds_left)} left"]
+    member, seconds = progress_now.slowest
     if member >= 0:
         parts += [f"member {member} alone took {_span(seconds)}"]
-    return ", ".join([*parts, *([f"{standing.failed} failed"] if standing.failed else [])])
+    return ", ".join([*parts, *([f"{progress_now.failed} failed"] if progress_now.failed else [])])
 
 
 def _span(seconds: float) -> str:

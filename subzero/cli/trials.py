@@ -15,7 +15,7 @@ from cyclopts import Parameter
 
 import scenarios
 from subzero.cli.examples import register
-from subzero.cli.output_mode import PLAIN, Voice
+from subzero.cli.output_mode import PLAIN, OutputMode
 from subzero.errors import UserError, printable, short
 
 if TYPE_CHECKING:
@@ -29,13 +29,13 @@ COMMANDS_COLUMN = "propeller_rps"
 """A CSV file with this column holds commands; any other is a measured record."""
 
 
-def list_shipped(*, vehicles: Flag = False, cables: Flag = False, voice: Voice = PLAIN) -> int:
+def list_shipped(*, vehicles: Flag = False, cables: Flag = False, output_mode: OutputMode = PLAIN) -> int:
     """List the scenarios that are shipped; with a flag, the vehicles or the cables instead.
 
     Args:
         vehicles: list the vehicles.
         cables: list the cables.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     from scenarios.contents import first_line
     from scenarios.files import shipped
@@ -43,7 +43,7 @@ def list_shipped(*, vehicles: Flag = False, cables: Flag = False, voice: Voice =
     kinds = [kind for kind, asked in (("vehicle", vehicles), ("cable", cables)) if asked]
     rows = {f"{kind}s": {name: first_line(kind, name) for name in shipped(f"{kind}s")} for kind in kinds}
     rows = rows or {"scenarios": {name: scenarios.describe(name) for name in scenarios.names()}}
-    with voice.tells(rows):
+    with output_mode.emit(rows):
         table = _grid()
         for names in rows.values():
             for name, words in names.items():
@@ -52,13 +52,13 @@ def list_shipped(*, vehicles: Flag = False, cables: Flag = False, voice: Voice =
     return FINE
 
 
-def new(path: Path, /, *, like: str = "fig6", voice: Voice = PLAIN) -> int:
+def new(path: Path, /, *, like: str = "fig6", output_mode: OutputMode = PLAIN) -> int:
     """Make a file of your own to begin with: a copy of a shipped scenario, vehicle or cable, every key explained.
 
     Args:
         path: file to make, such as my_trial.toml; one that exists is left alone.
         like: what to copy: a name of "subzero list", "subzero list --vehicles" or "subzero list --cables".
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     from scenarios.contents import locate
     from subzero.files.read_file import make_toml
@@ -69,28 +69,28 @@ def new(path: Path, /, *, like: str = "fig6", voice: Voice = PLAIN) -> int:
         )
     kind, source = locate(like)
     make_toml(path, source.text)
-    told = {"path": printable(str(path)), "kind": kind, "like": like}
-    with voice.tells(told):
-        print(f"Wrote {told['path']}, a {kind} like {like}. Edit it, then:")
-        print(f"  subzero validate {told['path']}")
+    reported = {"path": printable(str(path)), "kind": kind, "like": like}
+    with output_mode.emit(reported):
+        print(f"Wrote {reported['path']}, a {kind} like {like}. Edit it, then:")
+        print(f"  subzero validate {reported['path']}")
         if kind == "trial":
-            print(f"  subzero compare {told['path']}")
+            print(f"  subzero compare {reported['path']}")
         else:
-            print(f'  and name it in a trial: {kind} = "{told["path"]}"')
+            print(f'  and name it in a trial: {kind} = "{reported["path"]}"')
     return FINE
 
 
-def show(name: str, /, *, voice: Voice = PLAIN) -> int:
+def show(name: str, /, *, output_mode: OutputMode = PLAIN) -> int:
     """Show what a scenario, a vehicle or a cable says: every value with its unit, its range and its source.
 
     Args:
         name: a shipped name (see "subzero list"), or the path of a TOML file.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
     from scenarios.contents import contents
 
     found = contents(name)
-    with voice.tells(_as_json(found)):
+    with output_mode.emit(_as_json(found)):
         width = shutil.get_terminal_size().columns - 1
         head = f"{found.kind.capitalize()} {found.name}: {found.description}"
         legend = "Each value with its range, and below it what it is."
@@ -101,16 +101,16 @@ def show(name: str, /, *, voice: Voice = PLAIN) -> int:
     return FINE
 
 
-def validate(path: Path, /, *, voice: Voice = PLAIN) -> int:
+def validate(path: Path, /, *, output_mode: OutputMode = PLAIN) -> int:
     """Check a file without running it: a scenario, vehicle, cable or sweep (TOML); commands or a record (CSV).
 
     Args:
         path: the file. All its problems are told at once, each with its line and what is allowed.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
-    kind, told = _record(path) if path.suffix == ".csv" else _toml(path)
-    with voice.tells({"path": printable(str(path)), "kind": kind, "valid": True, "about": told}):
-        print(f"{printable(str(path))} is a valid {kind}: {told}")
+    kind, reported = _record(path) if path.suffix == ".csv" else _toml(path)
+    with output_mode.emit({"path": printable(str(path)), "kind": kind, "valid": True, "about": reported}):
+        print(f"{printable(str(path))} is a valid {kind}: {reported}")
     return FINE
 
 

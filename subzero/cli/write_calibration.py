@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from subzero.calibration.results import REMEDY, Advice, Calibration, Estimate
-from subzero.cli.output_mode import PLAIN, Voice
+from subzero.cli.output_mode import PLAIN, OutputMode
 from subzero.errors import UserError, printable
 
 if TYPE_CHECKING:
@@ -60,13 +60,15 @@ def write_all(found: Calibration, output_folder: OutputFolder, stem: str) -> Non
     write_figures({f"{stem}_{name}": figure for name, figure in figures.items()}, output_folder)
 
 
-def tell(found: Calibration, output_folder: OutputFolder, out: Path, *, voice: Voice = PLAIN) -> None:
+def print_calibration(
+    found: Calibration, output_folder: OutputFolder, out: Path, *, output_mode: OutputMode = PLAIN
+) -> None:
     """Print the numbers, what the records do not determine, and where the files are."""
-    with voice.tells(plain(mapping(found)) | output_folder.files()):
-        _tell(found, output_folder, out, Console())
+    with output_mode.emit(plain(mapping(found)) | output_folder.files()):
+        _print(found, output_folder, out, Console())
 
 
-def _tell(found: Calibration, output_folder: OutputFolder, out: Path, console: Console) -> None:
+def _print(found: Calibration, output_folder: OutputFolder, out: Path, console: Console) -> None:
     table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
     for name in ("number", "before", "calibrated", "95 %", "change"):
         words = name in ("number", "change")

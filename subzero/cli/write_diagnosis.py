@@ -23,7 +23,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from subzero.cli.output_mode import COMMAND, PLAIN, Voice
+from subzero.cli.output_mode import COMMAND, PLAIN, OutputMode
 from subzero.diagnosis.hypothesis.catalogue import all_effects
 from subzero.diagnosis.hypothesis.hypotheses import apply_extended
 from subzero.diagnosis.report import json_file, tables, words
@@ -63,7 +63,7 @@ MOST_ROWS = 12
 """So many causes that cannot be told apart are shown on the terminal; the report has them all."""
 
 
-def tell_before(rows: Sequence[Detectability], console: Console | None = None) -> None:
+def print_plan(rows: Sequence[Detectability], console: Console | None = None) -> None:
     """Print how much the records cannot show, or not tell apart, before anything is compared."""
     console = console or Console()
     hidden = tables.detectable(rows)
@@ -77,7 +77,7 @@ def tell_before(rows: Sequence[Detectability], console: Console | None = None) -
     )
 
 
-def _tell_hidden(verdict: Verdict, console: Console) -> None:
+def _print_unreported(verdict: Verdict, console: Console) -> None:
     """Print which causes these records cannot show, or not tell apart, behind what they do show."""
     hidden = tables.detectable(verdict)
     if not hidden.rows:
@@ -88,13 +88,13 @@ def _tell_hidden(verdict: Verdict, console: Console) -> None:
         console.print(f"… and {len(hidden.rows) - MOST_ROWS} more in the report.", highlight=False)
 
 
-def tell(
+def print_diagnosis(
     verdict: Verdict,
     output_folder: OutputFolder,
     console: Console | None = None,
     *,
     scenario: str = "SCENARIO",
-    voice: Voice = PLAIN,
+    output_mode: OutputMode = PLAIN,
 ) -> None:
     """Print a verdict in words, what cannot be told, and where the files are.
 
@@ -103,13 +103,13 @@ def tell(
         output_folder: where the files are.
         console: where to print.
         scenario: the trial as the user named it, a name or a path, for lines of the shell.
-        voice: how the command speaks.
+        output_mode: how the command speaks.
     """
-    with voice.tells(json_file.mapping(verdict) | output_folder.files()):
-        _tell(verdict, output_folder, console or Console(), scenario)
+    with output_mode.emit(json_file.mapping(verdict) | output_folder.files()):
+        _print(verdict, output_folder, console or Console(), scenario)
 
 
-def _tell(verdict: Verdict, output_folder: OutputFolder, console: Console, scenario: str) -> None:
+def _print(verdict: Verdict, output_folder: OutputFolder, console: Console, scenario: str) -> None:
     console.print(f"\n[bold]{escape(words.headline(verdict))}[/bold]", highlight=False)
     extended = shlex.quote(printable(str(output_folder.folder / "extended.toml")))
     for answer in summary(verdict, scenario, extended):
@@ -125,7 +125,7 @@ def _tell(verdict: Verdict, output_folder: OutputFolder, console: Console, scena
     for name, table in tables.gain(verdict, short=True).items():
         console.print(f"Root mean square error, {name}:", highlight=False, markup=False)
         console.print(_rich(table, console.width), highlight=False)
-    _tell_hidden(verdict, console)
+    _print_unreported(verdict, console)
     console.print(output_folder.words(), highlight=False, markup=False)
 
 
@@ -191,8 +191,8 @@ def write_all(
         verdict.extended, logged[0].setting, effects=all_effects(effects), effects_file=own, source=sources
     )
     _write(output_folder, "extended.toml", extended)
-    told = {trial.name: _about(trial) for trial in logged}
-    _write(output_folder, "diagnosis.json", json_file.text(verdict, told, logged[0].setting.trial.source))
+    reported = {trial.name: _about(trial) for trial in logged}
+    _write(output_folder, "diagnosis.json", json_file.text(verdict, reported, logged[0].setting.trial.source))
     figures = _draw(verdict, logged, output_folder)
     _write(
         output_folder,

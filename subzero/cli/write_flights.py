@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from subzero.cli.output_mode import COMMAND, PLAIN, Voice
+from subzero.cli.output_mode import COMMAND, PLAIN, OutputMode
 from subzero.errors import printable
 from subzero.figures.style import (
     LINES,
@@ -28,7 +28,7 @@ from subzero.figures.style import (
     warnings_in_short,
 )
 from subzero.results import netcdf_csv
-from subzero.results.tables import NOTHING, index_words, show_warnings
+from subzero.results.tables import NOTHING, index_in_words, show_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -71,8 +71,8 @@ def write(
     return summary
 
 
-def tell(
-    summary: dict[str, Any], names: list[str], output_folder: OutputFolder, voice: Voice = PLAIN
+def print_flights(
+    summary: dict[str, Any], names: list[str], output_folder: OutputFolder, output_mode: OutputMode = PLAIN
 ) -> list[str]:
     """Print indices, warnings and where the files are; return the messages of runs that could not go on."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
@@ -82,9 +82,9 @@ def tell(
     for key in summary[names[0]]["indices"]:
         cells = [summary[name]["indices"][key] for name in names]
         table.add_row(
-            escape(index_words(key)), *(NOTHING if cell is None else f"{cell:.4g}" for cell in cells)
+            escape(index_in_words(key)), *(NOTHING if cell is None else f"{cell:.4g}" for cell in cells)
         )
-    with voice.tells(summary | output_folder.files()):
+    with output_mode.emit(summary | output_folder.files()):
         console = Console()
         console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)
         console.print(table, highlight=False)

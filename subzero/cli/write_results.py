@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from subzero.cli.output_mode import COMMAND, PLAIN, Voice
+from subzero.cli.output_mode import COMMAND, PLAIN, OutputMode
 from subzero.results import netcdf_csv
 
 if TYPE_CHECKING:
@@ -92,8 +92,12 @@ def write_film(kind: str | None, output_folder: OutputFolder) -> None:
         film(output_folder.path / "report.html", output_folder.path / f"replay.{kind}", progress)
 
 
-def tell(
-    summary: dict[str, Any], output_folder: OutputFolder, *, strict: bool = False, voice: Voice = PLAIN
+def print_results(
+    summary: dict[str, Any],
+    output_folder: OutputFolder,
+    *,
+    strict: bool = False,
+    output_mode: OutputMode = PLAIN,
 ) -> bool:
     """Print the summary and where the files are; say why runs could not go on, and if `strict`, that some warn.
 
@@ -102,9 +106,9 @@ def tell(
     """
     from subzero.results.tables import RUNS, show
 
-    with voice.tells(summary | output_folder.files()):
+    with output_mode.emit(summary | output_folder.files()):
         console = Console()
-        show(summary, console, whole=voice.verbose)
+        show(summary, console, whole=output_mode.verbose)
         console.print(output_folder.words(), highlight=False, markup=False)
     stopped = [label for label in RUNS if summary.get(label, {}).get("outcome") == "stopped"]
     for label in stopped:

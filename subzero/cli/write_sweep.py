@@ -17,7 +17,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from subzero.cli.output_mode import COMMAND, PLAIN, Voice
+from subzero.cli.output_mode import COMMAND, PLAIN, OutputMode
 from subzero.errors import printable
 from subzero.page.report import Drawn, drawn
 from subzero.results import netcdf_csv
@@ -27,7 +27,7 @@ from subzero.sweeps.outcomes import unit_of
 from subzero.sweeps.page import numbers, page_of_sweep, warning_lines, what_matters
 from subzero.sweeps.plan import Plan
 from subzero.sweeps.result import RESULT, TABLE, Gathered, percentiles, write_result
-from subzero.sweeps.sensitivity import Effect, effects_of, words_of
+from subzero.sweeps.sensitivity import Effect, description_of, effects_of
 from subzero.sweeps.store import FILE, Store
 
 if TYPE_CHECKING:
@@ -144,7 +144,7 @@ def summary_of(plan: Plan, store: Store, found: Gathered, effects: list[Effect])
             name: {"unit": unit_of(name), **percentile} for name, percentile in percentiles(found).items()
         },
         "sensitivity": {
-            "method": words_of(points.design)[0],
+            "method": description_of(points.design)[0],
             "effects": [_plain(effect) for effect in effects],
         },
     }
@@ -164,13 +164,15 @@ def _in_short(summary: dict[str, Any]) -> str:
     return "; ".join([*failed, *warned])
 
 
-def tell_sweep(summary: dict[str, Any], output_folder: OutputFolder, voice: Voice = PLAIN) -> None:
+def print_sweep(
+    summary: dict[str, Any], output_folder: OutputFolder, output_mode: OutputMode = PLAIN
+) -> None:
     """Print what came of a sweep."""
-    with voice.tells(summary | output_folder.files()):
-        _tell(summary, output_folder, Console())
+    with output_mode.emit(summary | output_folder.files()):
+        _print(summary, output_folder, Console())
 
 
-def _tell(summary: dict[str, Any], output_folder: OutputFolder, console: Console) -> None:
+def _print(summary: dict[str, Any], output_folder: OutputFolder, console: Console) -> None:
     console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)
     console.print(_rich(numbers(summary), words=1), highlight=False)
     if summary["sensitivity"]["effects"]:

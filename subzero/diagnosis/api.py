@@ -35,13 +35,13 @@ from subzero.diagnosis.hypothesis.logged import NO_RECORD, Logged
 from subzero.diagnosis.hypothesis.noise import level_of
 from subzero.diagnosis.inference.data_error_choice import compared
 from subzero.diagnosis.inference.data_error_evidence import Explained, leaves_only_noise
-from subzero.diagnosis.inference.data_error_search import SuspectedError, is_soft, suspected
+from subzero.diagnosis.inference.data_error_search import SuspectedError, mimicked_by_physics, suspected
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 from subzero.diagnosis.inference.model_average import NAMED_PROBABILITY
 from subzero.diagnosis.inference.model_search import Search
 from subzero.diagnosis.inference.out_of_catalogue import (
     Findings,
-    each_with_own_noise,
+    each_with_refitted_noise,
     explanations_outside,
     is_explained,
 )
@@ -180,7 +180,7 @@ def _diagnosed(
     budget: str,
 ) -> Verdict:
     """Diagnose records whose channels all hold."""
-    begun = perf_counter()
+    started = perf_counter()
     problem = pose(records, effects)
     with threadpool_limits(limits=1, user_api="blas"):  # runs have the cores; matrices are small
         suspicion = suspected(problem, records)
@@ -191,7 +191,7 @@ def _diagnosed(
             seen=seen or (lambda table: None),
             seed=seed,
             budget=budget,
-            scanned=perf_counter() - begun,
+            scanned=perf_counter() - started,
             most=len(suspicion.errors) + 1,
         )
         if not suspicion.errors:
@@ -232,7 +232,7 @@ def _without_worst_channel(records: Sequence[Logged]) -> tuple[list[Logged], str
 
 @dataclass(kw_only=True, eq=False)
 class _Looking:
-    """Searches records, as they are or with something in them put right: a `Look`.
+    """Searches records, as they are or with something in them put right: a `DiagnosisSteps`.
 
     Attributes:
         problem: of the records as they are.
@@ -254,7 +254,7 @@ class _Looking:
     done: int = 0
     shown: float = 0.0
 
-    def _say(self, share: float, words: str) -> None:
+    def _report_progress(self, share: float, words: str) -> None:
         """Tell the progress, which never goes back."""
         self.shown = max(self.shown, share)
         self.progress(self.shown, words)
@@ -264,7 +264,7 @@ class _Looking:
         low, self.done = self.done / self.most, self.done + 1
         search = Search(
             problem=posed_again(self.problem, records, self.effects),
-            progress=lambda share, words: self._say(low + share / self.most, words),
+            progress=lambda share, words: self._report_progress(low + share / self.most, words),
         )
         work = Findings(search=search, seed=self.seed, budget=self.budget)
         work.seconds["errors in the data"] = self.scanned
@@ -274,12 +274,12 @@ class _Looking:
 
     def begin(self, work: Findings, is_hopeless: Callable[[], bool] = lambda: False) -> None:
         """Have a first look; if it is hopeless, no farther than outside, as what is there may explain records, too."""
-        _keeping_what_there_is(work, lambda: _first_look(work, is_hopeless))
+        _keeping_what_there_is(work, lambda: _first_step(work, is_hopeless))
 
     def finish(self, work: Findings) -> None:
         """Find the rest."""
         if work.complete and self.budget != "screen":
-            _keeping_what_there_is(work, lambda: _look_closer(work))
+            _keeping_what_there_is(work, lambda: _refine(work))
 
 
 def _keeping_what_there_is(findings: Findings, part: Callable[[], None]) -> None:
@@ -295,9 +295,9 @@ def _keeping_what_there_is(findings: Findings, part: Callable[[], None]) -> None
 @contextmanager
 def _timed(findings: Findings, part: str) -> Iterator[None]:
     """Keep how long a part takes."""
-    begun = perf_counter()
+    started = perf_counter()
     yield
-    findings.seconds[part] = findings.seconds.get(part, 0.0) + perf_counter() - begun
+    findings.seconds[part] = findings.seconds.get(part, 0.0) + perf_counter() - started
 
 
 def _concluded(findings: Findings) -> Verdict:
@@ -317,7 +317,7 @@ def _fit_wide(findings: Findings, seen: Seen) -> None:
         seen(findings.detectable)
 
 
-def _first_look(findings: Findings, is_hopeless: Callable[[], bool]) -> None:
+def _first_step(findings: Findings, is_hopeless: Callable[[], bool]) -> None:
     """Screen all hypotheses, fit the best, and look outside where none of them explains the records."""
     search, explained = findings.search, False
     with _timed(findings, "screen"):
@@ -329,7 +329,7 @@ def _first_look(findings: Findings, is_hopeless: Callable[[], bool]) -> None:
             if findings.given_up:
                 return
         if not search.is_far or not search.screen.far:
-            search.look()
+            search.screen_causes()
     if findings.budget == "screen":
         search.fit(())
         return
@@ -341,10 +341,10 @@ def _first_look(findings: Findings, is_hopeless: Callable[[], bool]) -> None:
         if search.is_poor() and not findings.given_up:
             search.refine_first()
     if search.is_poor() and not findings.out_of_catalogue:
-        _look_outside(findings, 0.6, "forces, and causes that begin in mid-trial")
+        _search_out_of_catalogue(findings, 0.6, "forces, and causes that begin in mid-trial")
 
 
-def _look_closer(findings: Findings) -> None:
+def _refine(findings: Findings) -> None:
     """Fit until nothing gets better, and look outside again."""
     search = findings.search
     if not is_explained(search, findings.out_of_catalogue):
@@ -352,15 +352,15 @@ def _look_closer(findings: Findings) -> None:
             search.refine_first()
             search.grow()
             search.settle()
-        _look_outside(findings, 0.8, "forces that no cause explains")
+        _search_out_of_catalogue(findings, 0.8, "forces that no cause explains")
     with _timed(findings, "outside"):
         findings.refuted = refuted_rivals(search)
         findings.sensitive = sensitive_runs(search.problem, search.best().fit.z)
-        findings.out_of_catalogue = each_with_own_noise(search, findings.out_of_catalogue)
+        findings.out_of_catalogue = each_with_refitted_noise(search, findings.out_of_catalogue)
         _measure_misfit(findings)
 
 
-def _look_outside(findings: Findings, share: float, words: str) -> None:
+def _search_out_of_catalogue(findings: Findings, share: float, words: str) -> None:
     findings.search.progress(share, words)
     with _timed(findings, "outside"):
         findings.out_of_catalogue = explanations_outside(findings.search)
@@ -378,8 +378,8 @@ def _one_explains(findings: Findings) -> bool:
     """
     findings.search.progress(0.2, "causes of any size")
     findings.search.only_nothing()
-    findings.search.look()
-    findings.search.fit_from_afar()
+    findings.search.screen_causes()
+    findings.search.fit_large_effects()
     return leaves_only_noise(findings) and not findings.search.is_poor()
 
 
@@ -390,7 +390,7 @@ def _from_afar(findings: Findings) -> None:
     aside = search.set_aside()
     findings.out_of_catalogue = explanations_outside(search)
     if findings.out_of_catalogue[0].point:
-        search.go_near(findings.out_of_catalogue[0].point.fit)
+        search.relinearise_at(findings.out_of_catalogue[0].point.fit)
     search.take_back(aside)
 
 
@@ -410,16 +410,18 @@ def _on_records(
     total, logs = log_sum([log for _, log in tried]), {id(trial): log for trial, log in tried}
     each = np.exp([logs[id(trial)] - total for trial in sets])
     at_least = np.minimum(np.cumsum(each[::-1])[::-1], MOST)  # of a set, or one that holds it
-    told = max((i for i, trial in enumerate(sets) if _is_named(trial, at_least[i])), default=0)
-    verdict = conclude(sets[told].work)
+    reported = max((i for i, trial in enumerate(sets) if _is_named(trial, at_least[i])), default=0)
+    verdict = conclude(sets[reported].work)
     is_complete = all(trial.work.complete for trial in sets)
-    if sets[told].errors:
-        is_decided = is_complete or not any(map(is_soft, sets[told].errors))
-        verdict = _with_errors(verdict, records, sets[told], float(at_least[told]) if is_decided else None)
+    if sets[reported].errors:
+        is_decided = is_complete or not any(map(mimicked_by_physics, sets[reported].errors))
+        verdict = _with_errors(
+            verdict, records, sets[reported], float(at_least[reported]) if is_decided else None
+        )
     verdict = replace(verdict, complete=is_complete)
-    if told + 1 == len(sets):
+    if reported + 1 == len(sets):
         return verdict
-    return _with_possible(verdict, records, sets[told], sets[told + 1], float(at_least[told + 1]))
+    return _with_possible(verdict, records, sets[reported], sets[reported + 1], float(at_least[reported + 1]))
 
 
 def _is_named(explanation: Explained, probability: float) -> bool:
@@ -436,7 +438,7 @@ def _with_errors(
     where they could not be held against all else (None), as the diagnosis was interrupted.
     """
     share = EVEN if probability is None else probability
-    errors = _told(records, explanation.errors, share)
+    errors = _reported(records, explanation.errors, share)
     curves = {
         name: replace(own, recorded=_recorded(records, explanation.errors, name))
         for name, own in after.curves.items()
@@ -467,19 +469,19 @@ def _recorded(
 
 
 def _with_possible(
-    told: Verdict, records: Sequence[Logged], less: Explained, more: Explained, probability: float
+    reported: Verdict, records: Sequence[Logged], less: Explained, more: Explained, probability: float
 ) -> Verdict:
     """Return a verdict beside which further errors in the data are possible.
 
     Errors that would be probable enough, but may not be named, are held to be as probable as not.
     """
     if probability < WORTH_TELLING:
-        return told
+        return reported
     probability = min(probability, EVEN)
     known = {(error.record, error.error.id) for error in less.errors}
     further = [error for error in more.errors if (error.record, error.error.id) not in known]
-    errors = _told(records, further, probability)
-    listed = {name: (1.0 - probability) * p for name, p in told.probabilities.items()}
+    errors = _reported(records, further, probability)
+    listed = {name: (1.0 - probability) * p for name, p in reported.probabilities.items()}
     listed[_beside(more.errors, "none")] = probability
     words = " and ".join(error.sentence for error in errors)
     rival = Rival(
@@ -488,20 +490,20 @@ def _with_possible(
         probability=probability,
         discrimination=np.nan,
     )
-    drawn = _with_planted(told.curves, records, more, further, f"rival: {_beside(more.errors, 'none')}")
-    rivals = tuple(sorted([*told.rivals, rival], key=lambda each: -each.probability))
+    drawn = _with_planted(reported.curves, records, more, further, f"rival: {_beside(more.errors, 'none')}")
+    rivals = tuple(sorted([*reported.rivals, rival], key=lambda each: -each.probability))
     ranked = dict(sorted(listed.items(), key=lambda pair: -pair[1]))
     beside = replace(
-        told,
+        reported,
         rivals=rivals,
         curves=drawn,
         probabilities=ranked,
-        sentence=f"{told.sentence} Or {words}.",
-        data_errors=told.data_errors or errors,
+        sentence=f"{reported.sentence} Or {words}.",
+        data_errors=reported.data_errors or errors,
     )
-    if probability <= 1.0 - NAMED_PROBABILITY or told.on_model == NOTHING_NEAR:
+    if probability <= 1.0 - NAMED_PROBABILITY or reported.on_model == NOTHING_NEAR:
         return beside
-    return replace(beside, then=UNDECIDED) if told.then else replace(beside, verdict=UNDECIDED)
+    return replace(beside, then=UNDECIDED) if reported.then else replace(beside, verdict=UNDECIDED)
 
 
 def _with_planted(
@@ -530,7 +532,7 @@ def _beside(found: Sequence[SuspectedError], name: str) -> str:
     return " + ".join([*ids, *([] if name == "none" else [name])])
 
 
-def _told(
+def _reported(
     records: Sequence[Logged], found: Sequence[SuspectedError], probability: float
 ) -> tuple[FoundError, ...]:
     return tuple(

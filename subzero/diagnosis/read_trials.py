@@ -3,8 +3,8 @@
 A record is a CSV file of `subzero.records.record`, with or without columns of commands and a file of metadata. All that
 can be wrong with it is said before anything long is begun, in one message for a record.
 
-A comparison (`check_epoch`, `check_beside`) asks for less: the epoch, the units and the signs, but neither a length nor
-a sampling rate. It has its simulation anyway, so these checks cost nothing.
+A comparison (`check_epoch`, `check_against_runs`) asks for less: the epoch, the units and the signs, but neither a
+length nor a sampling rate. It has its simulation anyway, so these checks cost nothing.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from subzero.records.consistency import (
     without_repeats,
 )
 from subzero.records.metadata import Metadata, read_metadata
-from subzero.records.record import Record, beside, fits, measured_alone, modelled, read_record
+from subzero.records.record import Record, fits, measured_alone, modelled, read_record, with_heading_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -165,7 +165,7 @@ def _channels(record: Record, sidecar: Metadata) -> tuple[dict[str, np.ndarray],
 def _checked(logged: Logged, sidecar: Metadata, simulated: Simulated | None) -> Logged:
     """Return a record whose channels look like its trial."""
     nominal = (simulated or _nominal())(logged.setting, logged.record.time, tuple(logged.record.values))
-    record = beside(logged.record, nominal.get(HEADING))
+    record = with_heading_of(logged.record, nominal.get(HEADING))
     values = record.values
     noise = {channel: logged.noise.get(channel, NOISE[channel]) for channel in values}
     suspects = {channel: column for channel, column in values.items() if not sidecar.trusts(channel)}
@@ -220,7 +220,7 @@ def check_epoch(record: Record, trial: scenarios.Trial) -> Metadata:
     return read_metadata(path.with_suffix(".toml")) if path.suffix.lower() == ".csv" else Metadata()
 
 
-def check_beside(record: Record, runs: Mapping[str, xr.Dataset], sidecar: Metadata) -> None:
+def check_against_runs(record: Record, runs: Mapping[str, xr.Dataset], sidecar: Metadata) -> None:
     """Check that a record looks like one of the runs of its trial, the tethered one first.
 
     Raises:

@@ -4,7 +4,7 @@
 
 relative to the water. ΔE is the change of the kinetic energy (hull with its added mass, cable), of the potential energy
 and of the elastic energy. What a missing force takes is booked with the loss of the hull. In a current that changes
-along the way, the hull's balance closes only as far as it may be taken as steady (`vehicle_step.feel_current`), and
+along the way, the hull's balance closes only as far as it may be taken as steady (`vehicle_step.sample_current`), and
 what the current does to the cable is booked with its added mass. The terms of the cable are those of
 `cable.moving_end.energy`. Powers are summed up by the trapezoidal rule over hull steps (hull) and exchanges (cable),
 so the residual is of second order in both. In a prescribed run the "propeller" is whatever moves the tow point.
@@ -31,7 +31,7 @@ from cable.moving_end import (
     energy_flow,
     take_jolt,
 )
-from subzero.engine.external_wrench import add_missing, feel_current, row_at, tow_wrench
+from subzero.engine.external_wrench import add_missing, row_at, sample_current, tow_wrench
 from subzero.engine.run_state import HEADING, LINEAR_ROWS, PITCH, TIME, Live, Setup
 from subzero.jit import allocating, inlined, inner
 from vehicle import kinetic_energy, power, rotation
@@ -121,7 +121,7 @@ def _hull_power(
     for i in range(3):
         hull.pull[i] = live.now.force_before[i] + x * (live.now.force[i] - live.now.force_before[i])
     tow_wrench(live.path[row], hull.pull, setup.fixed.r_c, hull)
-    feel_current(setup, live.path[row], time, hull)
+    sample_current(setup, live.path[row], time, hull)
     if not setup.fixed.prescribed:
         for i in range(6):
             hull.wrench[i] = 0.0

@@ -24,7 +24,7 @@ def drum_of(model: Model) -> DrumProperties | Winch:
     return PayOutRate(rate=follow) if winch.control == "pay_out_rate" else ConstantTension(tension=follow)
 
 
-def way_of_drum(trial: scenarios.Trial, model: Model, wet: float) -> np.ndarray:
+def drum_direction(trial: scenarios.Trial, model: Model, wet: float) -> np.ndarray:
     """Return where the drum goes, and what its winch is asked for, from a length `wet` [m] on, as `cable.drum_motion`.
 
     The times are those of the exchanges, and of all changes of winch and vessel: between them a velocity is linear, so

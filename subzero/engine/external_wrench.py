@@ -46,7 +46,7 @@ def tow_wrench(state: np.ndarray, F: np.ndarray, r_c: np.ndarray, work: HullWork
 
 
 @inlined
-def feel_current(setup: Setup, state: np.ndarray, time: float, work: HullWork) -> None:
+def sample_current(setup: Setup, state: np.ndarray, time: float, work: HullWork) -> None:
     """Fill work.current (3,) with the water's velocity at the hull's centre. [m/s].
 
     Departs from source: where the water changes along the vehicle's way, the hull takes every instant as steady and
@@ -66,7 +66,7 @@ def tow_point(state: np.ndarray, r_c: np.ndarray, R: np.ndarray, out: np.ndarray
 
 
 @compiled
-def way_of_tow_point(state: np.ndarray, r_c: np.ndarray, R: np.ndarray, out: np.ndarray) -> float:
+def tow_direction(state: np.ndarray, r_c: np.ndarray, R: np.ndarray, out: np.ndarray) -> float:
     """Fill out (3,) with the unit vector along which the tow point goes, forward where it goes straight or rests.
 
     R is R_nb of the state. Returns its speed along that vector, negative astern. [m/s]

@@ -39,8 +39,8 @@ from cable.moving_end import (
     try_step,
 )
 from cable.task import START_LENGTH
-from subzero.engine.environment import drum_of, way_of_drum
-from subzero.engine.external_wrench import feel_current, tow_point, way_of_tow_point
+from subzero.engine.environment import drum_direction, drum_of
+from subzero.engine.external_wrench import sample_current, tow_direction, tow_point
 from subzero.engine.prescribed_motion import knots
 from subzero.engine.recording import new_recording, record_row
 from subzero.engine.run_state import LINEAR_ROWS, Fixed, HullWork, Ledger, Live, Now, Orders, Setup
@@ -168,7 +168,7 @@ def setup_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Setup:
         orders=_orders(trial),
         track=_track(trial),
         water=model.water().numbers(),
-        led=way_of_drum(trial, model, _wet_length(trial)),
+        led=drum_direction(trial, model, _wet_length(trial)),
         added=added,
         terms=terms,
     )
@@ -191,7 +191,7 @@ def lay_out(setup: Setup, live: Live, wet: float) -> None:
     if setup.fixed.prescribed:
         pose(setup.track, 0.0, state)
     tow_point(state, fixed.r_c, now.hull.rotation, now.tow)
-    speed = way_of_tow_point(state, fixed.r_c, now.hull.rotation, now.guess)
+    speed = tow_direction(state, fixed.r_c, now.hull.rotation, now.guess)
     for i in range(3):
         fixed.drum_place[i] = now.tow[i] - wet * now.guess[i]
         setup.water.points[i] = fixed.drum_place[i]
@@ -203,7 +203,7 @@ def lay_out(setup: Setup, live: Live, wet: float) -> None:
     energy_flow(live.line, fixed.cable, live.load, now.ledger.cable_new)
     for i in range(FLOWS):
         now.ledger.cable_old[i] = now.ledger.cable_new[i]
-    feel_current(setup, state, 0.0, now.hull)
+    sample_current(setup, state, 0.0, now.hull)
     now.ledger.kinetic = kinetic_energy(state, now.hull.current, fixed.vehicle)
 
 
@@ -270,11 +270,11 @@ def hang_between(setup: Setup, live: Live, trial: scenarios.Trial, model: Model)
     lay_held(live.line, held, now.change.copy(), fixed.drum.velocity, rate)
     live.line.ends.layout.segment_length = trial.segment_length
     now.force[:] = held.tow_force
-    begin_at_rest(setup, live)
+    start_at_rest(setup, live)
 
 
 @compiled
-def begin_at_rest(setup: Setup, live: Live) -> None:
+def start_at_rest(setup: Setup, live: Live) -> None:
     """Fill what a cable that is laid out has at the start: the water around it, its momenta, its energy."""
     start_in_water(live.line, setup.water, setup.fixed.cable, live.load)
     energy_flow(live.line, setup.fixed.cable, live.load, live.now.ledger.cable_new)
@@ -390,15 +390,15 @@ def go_on_with(
     other = setup_of(trial, model, tethered)
     other.fixed.drum_place[:] = setup.fixed.drum_place
     other.water.points[:3] = setup.water.points[:3]
-    begin_again(other, live, time)
+    restart_at(other, live, time)
     return other
 
 
 @allocating
-def begin_again(setup: Setup, live: Live, time: float) -> None:
+def restart_at(setup: Setup, live: Live, time: float) -> None:
     """Take the energies that are stored now, with the numbers that hold from now on, as those of the start."""
     ledger, flows = live.now.ledger, np.zeros(FLOWS)
-    feel_current(setup, live.state, time, live.now.hull)
+    sample_current(setup, live.state, time, live.now.hull)
     ledger.kinetic = kinetic_energy(live.state, live.now.hull.current, setup.fixed.vehicle)
     if setup.fixed.tethered:
         energy_flow(live.line, setup.fixed.cable, live.load, flows)

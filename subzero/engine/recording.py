@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cable.moving_end import NOW, paid_out
-from subzero.engine.external_wrench import feel_current, row_at, tow_wrench
+from subzero.engine.external_wrench import row_at, sample_current, tow_wrench
 from subzero.engine.run_state import Live, Setup
 from subzero.jit import compiled
 from vehicle import BREAKDOWN, STATE_SIZE, battery_voltage, breakdown, deflections, euler_angles
@@ -108,7 +108,7 @@ class Grid(NamedTuple):
     iterations: float = inf
 
 
-class Standing(NamedTuple):
+class RunState(NamedTuple):
     """Where a run stands between two calls of `subzero.engine.time_loop.run_rows`.
 
     Attributes:
@@ -191,7 +191,7 @@ def record_row(setup: Setup, live: Live, recording: Recording, row: int, time: f
     r.fins[row, 0], r.fins[row, 1], r.fins[row, 2] = deflections(state, command, setup.fixed.vehicle)
     if not setup.fixed.prescribed:
         water, wrench = live.now.hull.current, live.now.hull.wrench
-        feel_current(setup, state, time, live.now.hull)
+        sample_current(setup, state, time, live.now.hull)
         breakdown(state, command, water, wrench, setup.fixed.vehicle, r.breakdown[row])
         r.voltage[row] = battery_voltage(state, command, water, setup.fixed.vehicle)
     r.iterations[row] = live.now.iterations

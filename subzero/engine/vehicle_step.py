@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from subzero.engine.external_wrench import add_missing, feel_current, row_at, tow_wrench
+from subzero.engine.external_wrench import add_missing, row_at, sample_current, tow_wrench
 from subzero.engine.run_state import HEADING, LINEAR_ROWS, PITCH, PLACE, SLOPE, SPEED, TIME, Live, Setup
 from subzero.jit import allocating, compiled, inlined, inner, scratch
 from vehicle import STATE_SIZE, derivative, derivative_and_power, finish_step, quaternion_from_euler, rotation
@@ -49,7 +49,7 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
             for i in range(3):
                 work.pull[i] = now.guess[i] + (along - 1.0) * ratio * (now.force[i] - now.force_before[i])
             tow_wrench(stage, work.pull, setup.fixed.r_c, work)
-            feel_current(setup, stage, start + n * h + part, work)
+            sample_current(setup, stage, start + n * h + part, work)
             if setup.fixed.lacking:
                 add_missing(setup, live, stage, command, start + n * h + part, work)
             if s == 0 and setup.fixed.booked:

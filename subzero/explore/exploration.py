@@ -296,7 +296,7 @@ class Exploration:
         """Return a trial's run without refinement, as far as it gets in `ATTEMPT_S`."""
         began, reached, plain = perf_counter(), 0.0, replace(trial, rtol=0.0)
 
-        def told(fraction: float) -> None:
+        def reported(fraction: float) -> None:
             nonlocal reached
             progress(fraction)
             if fraction < 1.0 and perf_counter() - began > ATTEMPT_S:
@@ -304,7 +304,7 @@ class Exploration:
             reached = fraction
 
         try:
-            return self.simulate(plain, progress=told)
+            return self.simulate(plain, progress=reported)
         except _TakesLongError:  # the same steps up to there take the same time again
             steps = max(1, math.floor(reached * trial.duration / trial.cable_step))
             return self.simulate(replace(plain, duration=steps * trial.cable_step), progress=progress)
@@ -314,10 +314,10 @@ class Exploration:
         if not isinstance(error, ScenarioError):
             return {"": str(error)}
         owner = {key: slider.name for slider in self.sliders.values() for key in slider.shares}
-        told: dict[str, str] = {}
+        reported: dict[str, str] = {}
         for problem in error.problems:
-            told.setdefault(owner.get(problem.key, ""), str(problem))
-        return told
+            reported.setdefault(owner.get(problem.key, ""), str(problem))
+        return reported
 
     @cached_property
     def nominal_summary(self) -> dict[str, Any]:
@@ -386,9 +386,9 @@ def text_with(trial: Trial, changes: Values, folder: Path) -> str:
     for name, value in changes.items():
         _set(document, name, float(value))
     _lead_from(document, Path(trial.source).parent, folder)
-    told = "".join(f"#   {name} = {float(value)!r}\n" for name, value in changes.items())
+    reported = "".join(f"#   {name} = {float(value)!r}\n" for name, value in changes.items())
     head = f"# {printable(trial.source)}, changed by subzero explore" + (
-        f":\n{told}" if told else "; nothing yet.\n"
+        f":\n{reported}" if reported else "; nothing yet.\n"
     )
     return f"{head}\n{tomlkit.dumps(document)}"
 

@@ -231,7 +231,7 @@ class Tab:
             self._work,
             lambda shown: self._later(self.show, shown),
             lambda error: self._later(
-                self._say, f"This is a bug of subzero: {error!r}. The terminal has more."
+                self._report_progress, f"This is a bug of subzero: {error!r}. The terminal has more."
             ),
         )
         ui.add_head_html(
@@ -253,11 +253,11 @@ class Tab:
     def _work(self, values: Values, progress: Callable[[float], None]) -> Shown:
         """Show rough answers as they come, and return the last one."""
 
-        def told(fraction: float) -> None:
+        def reported(fraction: float) -> None:
             self.fraction = fraction
             progress(fraction)
 
-        for answer in self.page.exploration.answers(values, told):
+        for answer in self.page.exploration.answers(values, reported):
             shown = self.page.shown(answer)
             if answer.rough:
                 self._later(self.show, shown)
@@ -343,7 +343,7 @@ class Tab:
         answer = shown.answer
         for name, knob in self.knobs.items():
             knob.say(answer.refusals.get(name, ""))
-        self._say(answer.refusals.get("", ""))
+        self._report_progress(answer.refusals.get("", ""))
         self.fraction = 0.0
         if answer.run is None:
             self.status.set_text("Refused; what is shown is the run before.")
@@ -360,7 +360,7 @@ class Tab:
                 ".then((data) => document.getElementById('replay').contentWindow.subzero?.show(data))"
             )
 
-    def _say(self, words: str) -> None:
+    def _report_progress(self, words: str) -> None:
         self.refused.set_text(words)
 
     def _show_numbers(self, summary: dict[str, Any]) -> None:
@@ -369,14 +369,14 @@ class Tab:
         for cells, row in zip(self.cells, self.page.exploration.numbers(summary), strict=True):
             for cell, text in zip(cells, row, strict=True):
                 cell.set_text(text)
-        told = [each["message"] for each in summary["warnings"]]
+        reported = [each["message"] for each in summary["warnings"]]
         stopped = [] if summary["outcome"] == "completed" else [summary["outcome_message"]]
         self.warnings.clear()
         with self.warnings:
-            ui.label("Warnings of the run" if told or stopped else "The run has no warnings.").classes(
+            ui.label("Warnings of the run" if reported or stopped else "The run has no warnings.").classes(
                 "section"
             )
-            for words in (*stopped, *told):
+            for words in (*stopped, *reported):
                 ui.label(words).classes("warning")
 
     def _move_bar(self) -> None:

@@ -153,7 +153,7 @@ def configurations(run: xr.Dataset, axes: Axes, times: list[float]) -> None:
     axes.invert_yaxis()  # down is down; and from above, with north to the right, east is down
 
 
-def way_of_drum(run: xr.Dataset) -> np.ndarray:
+def drum_direction(run: xr.Dataset) -> np.ndarray:
     """Return where the drum is, relative to its place at the start (n, 3); without a cable it is not known. [m]."""
     nodes = run["node_count"].values
     places: np.ndarray = run["cable_position"].values[np.arange(nodes.size), np.maximum(nodes - 1, 0)]
@@ -162,7 +162,7 @@ def way_of_drum(run: xr.Dataset) -> np.ndarray:
 
 def axes_of(run: xr.Dataset) -> tuple[str, str, str]:
     """Return what the earth axes are called: counted from a drum that stands, or from where a vessel started."""
-    return MOVING if np.ptp(way_of_drum(run), axis=0).max() > RESTING else AXES
+    return MOVING if np.ptp(drum_direction(run), axis=0).max() > RESTING else AXES
 
 
 def longest(run: xr.Dataset, *candidates: int) -> int:
@@ -212,7 +212,7 @@ def _track(
     run: xr.Dataset, axes: Axes, right: int, up: int, times: np.ndarray, colours: list[Colour]
 ) -> None:
     """Draw where the tow point went, and the drum, behind the shapes; if the drum moves, its way and its places."""
-    tow, drum = run["cable_position"].values[:, 0], way_of_drum(run)
+    tow, drum = run["cable_position"].values[:, 0], drum_direction(run)
     axes.plot(tow[:, right], tow[:, up], color=style.GREY, linewidth=0.9, linestyle=":", zorder=1.5)
     if axes_of(run) is AXES:
         axes.plot(0.0, 0.0, "s", color=style.INK, markersize=4.5)
@@ -240,15 +240,15 @@ MARKS = 60.0
 
 def is_deployed(run: xr.Dataset) -> bool:
     """Say whether a winch turns the drum or a vessel carries it."""
-    told = json.loads(run.attrs["parameters"])
-    return any(told.get(name) for name in ("winch", "vessel"))
+    reported = json.loads(run.attrs["parameters"])
+    return any(reported.get(name) for name in ("winch", "vessel"))
 
 
 def deployment(run: xr.Dataset, title: Title) -> Figure:
     """Draw how the cable is deployed."""
     figure, (length, rate, pull, plan) = sheet(2, 2, title)
     time, S = run["time"].values, run["cable_length"].values
-    far = np.linalg.norm(run["cable_position"].values[:, 0] - way_of_drum(run), axis=1)
+    far = np.linalg.norm(run["cable_position"].values[:, 0] - drum_direction(run), axis=1)
     length.plot(time, S, color=style.BLUE, linewidth=1.5, label="$S$, cable in the water")
     length.plot(time, far, color=style.ORANGE, linestyle=style.DASHES[1], label="from drum to vehicle")
     headline(length, "Cable in the water, and the straight way")
@@ -272,7 +272,7 @@ def _tracks(run: xr.Dataset, axes: Axes) -> None:
     time = run["time"].values
     spacing = MARKS if time[-1] >= 2.0 * MARKS else max(0.1 * time[-1], 1e-9)
     marks = np.searchsorted(time, np.arange(0.0, time[-1] + 1e-9, spacing))
-    ways = {"vehicle": run["cable_position"].values[:, 0], "drum": way_of_drum(run)}
+    ways = {"vehicle": run["cable_position"].values[:, 0], "drum": drum_direction(run)}
     for (words, way), colour in zip(ways.items(), (style.ORANGE, style.BLUE), strict=True):
         axes.plot(way[:, EAST], way[:, NORTH], color=colour, linewidth=1.2, label=words)
         axes.plot(way[marks, EAST], way[marks, NORTH], "o", color=colour, markersize=3.0)
@@ -308,7 +308,7 @@ def shape_3d(run: xr.Dataset, title: Title, count: int = SHAPES) -> Figure:
     )
     if has_cable:
         _shapes_in_space(run, axes, count)
-        axes.plot(*way_of_drum(run)[-1:].T, "s", color=style.INK, markersize=4.5, label="drum")
+        axes.plot(*drum_direction(run)[-1:].T, "s", color=style.INK, markersize=4.5, label="drum")
     names = axes_of(run) if has_cable else ("north", "east", "depth")
     for set_label, name in zip((axes.set_xlabel, axes.set_ylabel, axes.set_zlabel), names, strict=True):
         set_label(f"{name} [m]", fontsize=style.SMALL)

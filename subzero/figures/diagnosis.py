@@ -16,13 +16,13 @@ import numpy as np
 from subzero.channels import BY_NAME
 from subzero.diagnosis.report.tables import CLEAR_FROM, CONFUSED_BELOW, SEEN_SIGNAL, WORTH_A_LINE
 from subzero.diagnosis.report.words import (
-    beside_errors,
     explanation,
     formula_term,
-    is_told,
+    is_reported,
     number,
     sentences,
     something,
+    with_errors,
     without_errors,
 )
 from subzero.diagnosis.results import (
@@ -120,10 +120,10 @@ def evidence(verdict: Verdict, title: Title) -> Figure | None:
     ranked = [(name, p) for name, p in ranked if p >= LEAST]
     if not ranked:
         return None
-    names = [_wrapped(beside_errors(name, verdict)) for name, _ in ranked]
+    names = [_wrapped(with_errors(name, verdict)) for name, _ in ranked]
     rows = sum(1 + name.count("\n") for name in names)
     figure, (plain, logarithmic) = _bars(2, rows, title, left=0.42, apart=0.2)
-    colours = [style.BLUE if is_told(name, verdict) else style.GREY for name, _ in ranked]
+    colours = [style.BLUE if is_reported(name, verdict) else style.GREY for name, _ in ranked]
     for axes in (plain, logarithmic):
         axes.barh(range(len(ranked)), [p for _, p in ranked], color=colours, height=0.65)
         axes.set_xlabel("probability", fontsize=style.NORMAL)

@@ -46,11 +46,13 @@ def is_straight(run: xr.Dataset) -> bool:
     """Say whether the run pulls a neutral cable straight off a free drum in still water: that has an exact solution."""
     turns = max(float(np.ptp(run[name].values)) for name in ("pitch", "heading", "roll_angle"))
     slides = max(float(np.abs(run[name].values).max()) for name in ("sway_speed", "heave_speed"))
-    told = json.loads(run.attrs["parameters"])
-    cable = told["cable"]
+    reported = json.loads(run.attrs["parameters"])
+    cable = reported["cable"]
     displaced = cable["water_density"] * cable.get("cross_section_area", np.inf)
     heavy = np.isfinite(displaced) and abs(cable["mass_per_length"] - displaced) > NEUTRAL * displaced
-    moved = any(told.get("current", ())) or any(told.get(name) for name in ("profile", "winch", "vessel"))
+    moved = any(reported.get("current", ())) or any(
+        reported.get(name) for name in ("profile", "winch", "vessel")
+    )
     return turns < ROUNDING and slides < ROUNDING and not heavy and not moved
 
 
@@ -67,8 +69,8 @@ def exact_tension(run: xr.Dataset) -> np.ndarray:
     Returns:
         tension at each time. Shape (samples,). [N]
     """
-    told = json.loads(run.attrs["parameters"])
-    cable, drum = told["cable"], told["drum"]
+    reported = json.loads(run.attrs["parameters"])
+    cable, drum = reported["cable"], reported["drum"]
     time, u = run["time"].values, run["surge_speed"].values
     slope = np.gradient(u, time) if time.size > 1 else np.zeros_like(u)
     way = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(time) * (u[1:] + u[:-1]))])

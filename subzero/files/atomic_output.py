@@ -296,12 +296,12 @@ def _is_failure(folder: Path, names: list[str]) -> bool:
     for name in {"summary.json", "diagnosis.json"} & set(names):
         with suppress(UserError, ValueError, RecursionError):
             found = json.loads(read_bytes(folder / name, MOST_OF_AN_ANSWER * 16))
-            if isinstance(found, dict) and _says_failure(found):
+            if isinstance(found, dict) and _is_marked_failed(found):
                 return True
     return False
 
 
-def _says_failure(found: dict[str, object]) -> bool:
+def _is_marked_failed(found: dict[str, object]) -> bool:
     runs = [value for value in found.values() if isinstance(value, dict)]
     return found.get("complete") is False or any(run.get("outcome") == "stopped" for run in runs)
 

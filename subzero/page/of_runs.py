@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from subzero.page.replay import HULL, actors_of, encode
 from subzero.page.report import Line, Report, Section, Table, render
-from subzero.results.tables import NOTHING, RUNS, fit_rows, index_words, number_groups
+from subzero.results.tables import NOTHING, RUNS, fit_rows, index_in_words, number_groups
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -41,7 +41,7 @@ def page_of_runs(
     labels = [label for label in RUNS if label in summary]
     return render(
         Report(
-            command_name=name or _second_word(command),
+            command_name=name or _scenario_word(command),
             scenario=summary["scenario"],
             title=summary["title"],
             version=summary["subzero_version"],
@@ -61,7 +61,7 @@ def _can_be_replayed(run: xr.Dataset) -> bool:
     return run.sizes["time"] > 1 and all(name in shape for name in HULL)
 
 
-def _second_word(command: str) -> str:
+def _scenario_word(command: str) -> str:
     return [*command.split(), "", ""][1]
 
 
@@ -111,7 +111,7 @@ def _indices(summary: dict[str, Any], labels: list[str]) -> list[tuple[str, ...]
 
     names = summary[labels[0]]["indices"]
     return [
-        (index_words(name), *(cell(summary[label]["indices"].get(name)) for label in labels))
+        (index_in_words(name), *(cell(summary[label]["indices"].get(name)) for label in labels))
         for name in names
     ]
 

@@ -202,7 +202,7 @@ def as_run(record: Record, beside: xr.Dataset, used: Mapping[str, np.ndarray]) -
         name: np.interp(time, beside["time"], beside[name]) for name in (*POSE, *ACTUATORS) if name in beside
     }
     pose = {name: values.get(name, from_run[name]) for name in ("roll_angle", "pitch", "heading")}
-    place = _reckoned(time, pose, values, {name: from_run[name][0] for name in ("north", "east", "depth")})
+    place = _computed(time, pose, values, {name: from_run[name][0] for name in ("north", "east", "depth")})
     shown = {**from_run, **values, **pose, **place}
     data = {name: ("time", each, BY_NAME[name].attributes) for name, each in shown.items()}
     import xarray as xr
@@ -222,7 +222,7 @@ def _filled(record: Record, name: str, time: np.ndarray, used: np.ndarray | None
     )
 
 
-def _reckoned(
+def _computed(
     time: np.ndarray,
     pose: Mapping[str, np.ndarray],
     values: Mapping[str, np.ndarray],

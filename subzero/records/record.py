@@ -253,9 +253,9 @@ def _meant(name: str) -> str:
     other loggers call so; or nothing.
     """
     words = re.findall(r"[a-z]+", re.sub(r"[\[(].*", "", name.lower()))  # without a unit in brackets
-    begun = max((each for each in BY_NAME if name.lower().startswith(f"{each}_")), key=len, default="")
-    if begun and ("rate" in words) == ("rate" in begun):
-        return BY_NAME[begun].column
+    started = max((each for each in BY_NAME if name.lower().startswith(f"{each}_")), key=len, default="")
+    if started and ("rate" in words) == ("rate" in started):
+        return BY_NAME[started].column
     others = [column for word in words for column, names in OTHER_WORDS.items() if word in names]
     likely = [*nearest(name, BY_COLUMN, likeness=SLIP_LIKENESS), *(others if "rate" not in words else ())]
     return next(iter([*likely, *nearest(name, BY_COLUMN)]), "")
@@ -390,7 +390,7 @@ def fits(runs: dict[str, xr.Dataset], record: Record) -> dict[str, dict[str, Fit
     return {name: {label: fit(run, record, name) for label, run in runs.items()} for name in record.values}
 
 
-def beside(record: Record, simulated: np.ndarray | None) -> Record:
+def with_heading_of(record: Record, simulated: np.ndarray | None) -> Record:
     """Return a record whose heading is counted as that of a simulation, without samples that contradict those around.
 
     Args:

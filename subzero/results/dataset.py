@@ -119,11 +119,13 @@ def plain_run(
         coordinates={TIME.name: Variable("time", run.times, TIME.attributes)} | _axes(run, spends),
         attrs=_provenance(trial, model, tethered, run),
     )
-    tell_accuracy(result, trial, model, accuracy)
+    record_accuracy(result, trial, model, accuracy)
     return result
 
 
-def tell_accuracy(result: PlainRun, trial: scenarios.Trial, model: Model, accuracy: Accuracy | None) -> None:
+def record_accuracy(
+    result: PlainRun, trial: scenarios.Trial, model: Model, accuracy: Accuracy | None
+) -> None:
     """Write into the attributes of a run how far its force can be trusted, and all that may be wrong with it."""
     result.attrs["accuracy"] = json.dumps(_accuracy_numbers(accuracy))
     result.attrs["warnings"] = as_json(check_run(result, trial, model))

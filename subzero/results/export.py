@@ -154,7 +154,7 @@ def _messages(run: xr.Dataset) -> Iterator[tuple[int, str, dict[str, Any]]]:
             yield at, "/tf", _transform(at, "ned", "vehicle", place[row], turn[row])
         if shapes is not None:
             yield at, "/scene", _scene(at, "cable", "ned", lines=[_line(shapes[row])])
-    for level, words in _told(run):
+    for level, words in _reported(run):
         yield times[-1], "/log", _line_of_log(times[-1], level, words)
 
 
@@ -180,7 +180,7 @@ def _shapes(run: xr.Dataset) -> list[np.ndarray] | None:
     return [shape[:count] for shape, count in zip(position, counts, strict=True)]
 
 
-def _told(run: xr.Dataset) -> Iterator[tuple[int, str]]:
+def _reported(run: xr.Dataset) -> Iterator[tuple[int, str]]:
     """Give the level and the words of what a run says of itself."""
     for load in json.loads(run.attrs.get("warnings", "[]")):
         yield WARNING, f"{load['check']}: {load['message']}"

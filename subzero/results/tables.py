@@ -55,7 +55,7 @@ INDEX_UNITS = {
 """How the name of an index ends → its unit; without such an end it is a share, or as large as the channel."""
 
 
-def index_words(name: str) -> str:
+def index_in_words(name: str) -> str:
     """Return the name of an index of a manoeuvre in words with its unit: ``rise_time_s`` is "rise time [s]"."""
     end = next((end for end in INDEX_UNITS if name.endswith(end)), "")
     return name.removesuffix(end).replace("_", " ") + (f" [{INDEX_UNITS[end]}]" if end else "")

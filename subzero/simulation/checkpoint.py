@@ -29,7 +29,7 @@ import numpy as np
 from cable.memory import fits
 from cable.moving_end import enlarged
 from subzero.arguments import checked_arguments
-from subzero.engine.recording import BY_NODE, BY_TIME, Recording, Standing, new_recording, row_of
+from subzero.engine.recording import BY_NODE, BY_TIME, Recording, RunState, new_recording, row_of
 from subzero.errors import UserError, checked, printable
 from subzero.files.atomic_output import DISK_FULL
 from subzero.files.integrity import DamagedError, append_digest, check_arrays, without_digest
@@ -64,7 +64,7 @@ class Checkpoint:
         object.__setattr__(self, "minutes", checked("Checkpoint", "minutes", self.minutes, least=0.0))
         object.__setattr__(self, "folder", Path(self.folder))
 
-    def stands_at(self) -> float | None:
+    def kept_until(self) -> float | None:
         """Return up to when the run that is under way is kept, None if nothing is. [s]"""
         states = sorted(Path(self.folder).glob(f"*/*/{STATE}"), key=lambda path: path.stat().st_mtime_ns)
         try:
@@ -109,26 +109,26 @@ class KeptRun:
         self._path, self._every, self._kept, self._times = folder / STATE, every, monotonic(), 0
         folder.mkdir(exist_ok=True)
 
-    def go_on(self, begun: Standing) -> Standing:
+    def go_on(self, started: RunState) -> RunState:
         """Return where the run stands that was kept here; what has `begun` where none was."""
         if not self._path.exists():
-            return begun
+            return started
         state = _read(self._path)
         with _damage_named(self._path):
             counts = {name: _count(state, name) for name in COUNTS}
-            line = enlarged(begun.live.line, _capacity(begun, state))
-            like = _arrays(begun.setup, "setup") | _arrays(begun.live._replace(line=line), "live")
+            line = enlarged(started.live.line, _capacity(started, state))
+            like = _arrays(started.setup, "setup") | _arrays(started.live._replace(line=line), "live")
             check_arrays(state, {name: (array.dtype, array.shape) for name, array in like.items()})
-            recording = _recording(begun, counts, state)
+            recording = _recording(started, counts, state)
         self._times = counts["behind"]
-        return Standing(
-            setup=_restored(begun.setup, "setup", state),
-            live=_restored(begun.live, "live", state),
+        return RunState(
+            setup=_restored(started.setup, "setup", state),
+            live=_restored(started.live, "live", state),
             recording=recording,
             **{name: counts[name] for name in ("behind", "used", "ending")},
         )
 
-    def keep(self, now: Standing, times: np.ndarray, stride: int, *, at_once: bool = False) -> None:
+    def keep(self, now: RunState, times: np.ndarray, stride: int, *, at_once: bool = False) -> None:
         """Keep where the run stands, if it is time for that, or at once."""
         is_due = at_once or monotonic() - self._kept >= self._every
         if not is_due or now.behind == self._times:
@@ -148,7 +148,7 @@ class KeptRun:
         self._kept, self._times = monotonic(), now.behind
 
 
-def _filled(now: Standing, stride: int) -> dict[str, np.ndarray]:
+def _filled(now: RunState, stride: int) -> dict[str, np.ndarray]:
     """Return what the arrays of a recording hold so far; the last row may be one that the next time replaces."""
     last = row_of(now.behind - 1, stride)
     is_whole = (now.behind - 1) % stride == 0
@@ -159,9 +159,9 @@ def _filled(now: Standing, stride: int) -> dict[str, np.ndarray]:
     }
 
 
-def _recording(begun: Standing, counts: Mapping[str, int], state: Mapping[str, np.ndarray]) -> Recording:
+def _recording(started: RunState, counts: Mapping[str, int], state: Mapping[str, np.ndarray]) -> Recording:
     """Return a recording with what was kept of it, and room for the rest."""
-    rows, times = begun.recording.state.shape[0], begun.recording.trace.shape[0]
+    rows, times = started.recording.state.shape[0], started.recording.trace.shape[0]
     if not fits(BYTES_A_NODE * counts["room"]) or counts["behind"] > times or counts["used"] > counts["room"]:
         raise DamagedError("it has more rows than its run")
     recording = new_recording(rows, counts["room"], times)
@@ -182,11 +182,11 @@ def _count(arrays: Mapping[str, np.ndarray], name: str) -> int:
     return count
 
 
-def _capacity(begun: Standing, state: Mapping[str, np.ndarray]) -> int:
+def _capacity(started: RunState, state: Mapping[str, np.ndarray]) -> int:
     """Return for how many segments the kept line has room: at least as many as at the start."""
     name = "live.line.length"
     check_arrays(state, {name: (np.dtype(float), state[name].shape[:1])})
-    return max(state[name].size, begun.live.line.length.size) - 1
+    return max(state[name].size, started.live.line.length.size) - 1
 
 
 def _kind(name: str) -> str:

@@ -27,9 +27,9 @@ from subzero.engine.initial_conditions import Later
 from subzero.errors import UserError
 from subzero.files.text_repr import Overview
 from subzero.model import Model, load, model_of
-from subzero.records.record import Fit, Record, beside, fits, measured_alone, modelled, read_record
+from subzero.records.record import Fit, Record, fits, measured_alone, modelled, read_record, with_heading_of
 from subzero.results.summary import FORCE, MOMENT, summarise, summary_of
-from subzero.simulation.memory_estimate import THINNED, told_of_results, with_fewer_results
+from subzero.simulation.memory_estimate import THINNED, thinning_notice, with_fewer_results
 from subzero.simulation.run import simulate
 from subzero.validity import RunWarning, as_json, warnings_of
 
@@ -137,23 +137,23 @@ def compare(
             "Leave out every_s (--every)."
         )
     sidecar = _checked(record, trial)
-    asked, trial = trial, _kept_alike(trial, model, record)
+    asked, trial = trial, _same_rows(trial, model, record)
     given = {"model": model, "later": later, "checkpoint": checkpoint}
     other: dict[str, Any] = {name: value for name, value in given.items() if value}
     tethered = simulate(trial, tethered=True, **other, progress=_part(progress, 0.0, 0.5))
     untethered = simulate(trial, tethered=False, **other, progress=_part(progress, 0.5, 1.0))
     if trial is not asked and record is None:
         for run in (tethered, untethered):
-            run.attrs[THINNED] = told_of_results(trial)
+            run.attrs[THINNED] = thinning_notice(trial)
     if record is not None:
-        record = beside(record, modelled(tethered, HEADING, record.time))
-        from subzero.diagnosis.read_trials import check_beside
+        record = with_heading_of(record, modelled(tethered, HEADING, record.time))
+        from subzero.diagnosis.read_trials import check_against_runs
 
-        check_beside(record, {"tethered": tethered, "untethered": untethered}, sidecar)
+        check_against_runs(record, {"tethered": tethered, "untethered": untethered}, sidecar)
     return Comparison(tethered=tethered, untethered=untethered, trial=trial, measured=record)
 
 
-def _kept_alike(trial: scenarios.Trial, model: Model | None, record: Record | None) -> scenarios.Trial:
+def _same_rows(trial: scenarios.Trial, model: Model | None, record: Record | None) -> scenarios.Trial:
     """Return a trial that keeps as many results of both runs, of a long one, too: all of them beside a record."""
     kept = with_fewer_results(trial, model_of(trial, model), True)
     return kept if record is None or kept is trial else dataclasses.replace(trial, every=trial.cable_step)

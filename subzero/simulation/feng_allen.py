@@ -42,13 +42,13 @@ from cable.feng_allen import (
     box_workspace,
     equation7_numbers,
     node_force,
+    reported,
     start_paper,
     tangent,
-    told,
 )
 from subzero.engine.coupling import ABSURD, CABLE_FAILED, FASTEST, FINE, _move, hull_steps
 from subzero.engine.energy import CABLE_LOSS, book
-from subzero.engine.external_wrench import tow_point, way_of_tow_point
+from subzero.engine.external_wrench import tow_direction, tow_point
 from subzero.engine.initial_conditions import first_state, prepare
 from subzero.engine.recording import Pace, Recording, Run, cut, new_recording, record_row, thinned
 from subzero.engine.run_state import Live, Setup
@@ -85,9 +85,9 @@ def run_printed_rows(
     for row in range(first, last):
         ending, report = _exchange(setup, live, line, times[row - 1], times[row] - times[row - 1])
         if ending != FINE:
-            return row, used, ending, told(report)
+            return row, used, ending, reported(report)
         used = record_printed(setup, live, line, recording, row, times[row], used)
-    return last, used, FINE, told(report)
+    return last, used, FINE, reported(report)
 
 
 @compiled
@@ -205,8 +205,10 @@ def run_as_printed(
     while row < times.size and ending == FINE:
         last = min(times.size, row + pace.rows)
         with pace:
-            row, used, ending, told = run_printed_rows(setup, live, line, recording, times, row, last, used)
-        report = NewtonReport(*told)
+            row, used, ending, reported = run_printed_rows(
+                setup, live, line, recording, times, row, last, used
+            )
+        report = NewtonReport(*reported)
         if progress is not None:
             progress(row / times.size)
     message = "The run reached its end." if ending == FINE else in_words(trial, ending, report, times[row])
@@ -225,7 +227,7 @@ def lay_cable(trial: scenarios.Trial, model: Model, setup: Setup, live: Live, ro
     start_at_drum(setup, live, w)
     if boxes:
         way = np.zeros(3)
-        speed = way_of_tow_point(live.state, setup.fixed.r_c, hull.rotation, way)
+        speed = tow_direction(live.state, setup.fixed.r_c, hull.rotation, way)
         w.count[0] = boxes + 1
         w.length[1 : boxes + 1] = wet / boxes
         w.y[: boxes + 1] = (0.0, -speed, 0.0, 0.0, *angles_of(*-way))

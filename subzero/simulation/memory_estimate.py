@@ -94,7 +94,7 @@ def with_fewer_results(trial: scenarios.Trial, model: Model, tethered: bool) -> 
     return dataclasses.replace(trial, every=stride * trial.cable_step)
 
 
-def told_of_results(trial: scenarios.Trial) -> str:
+def thinning_notice(trial: scenarios.Trial) -> str:
     """Return what a run tells whose results are fewer than there are steps, unasked."""
     step = f"{trial.cable_step:g}"
     return (
@@ -135,7 +135,7 @@ def bytes_a_row() -> float:
     return float(sum(values.nbytes for values in new_recording(1, 0)))
 
 
-def has_room(nodes: int) -> bool:
+def fits_in_memory(nodes: int) -> bool:
     """Say whether shapes of so many nodes in all can be kept, and made into a result."""
     return fits(COPIES * BYTES_A_NODE * nodes)
 

@@ -25,7 +25,7 @@ from subzero.engine.recording import (
     Pace,
     Recording,
     Run,
-    Standing,
+    RunState,
     new_recording,
     row_of,
     run_so_far,
@@ -34,14 +34,14 @@ from subzero.engine.run_state import Live, Setup
 from subzero.engine.time_loop import NO_ROOM, run_rows
 from subzero.errors import DISTRIBUTION, UserError, whole
 from subzero.model import Model, load, model_of
-from subzero.results.dataset import PlainRun, plain_run, tell_accuracy
+from subzero.results.dataset import PlainRun, plain_run, record_accuracy
 from subzero.simulation.memory_estimate import (
     REMEDY,
     THINNED,
-    has_room,
+    fits_in_memory,
     most_segments,
     refuse_what_cannot_fit,
-    told_of_results,
+    thinning_notice,
     with_fewer_results,
 )
 from subzero.simulation.provenance import code_digest, digest_of, processor, trial_digest
@@ -100,7 +100,7 @@ def simulate(
         kept, tethered=tethered, model=model, later=later, checkpoint=checkpoint, progress=progress
     )
     if kept.every != trial.every:
-        run.attrs[THINNED] = told_of_results(kept)
+        run.attrs[THINNED] = thinning_notice(kept)
     return run.labelled()
 
 
@@ -127,7 +127,7 @@ def simulate_plainly(
         result = plain_run(trial, model, tethered, run, accuracy, spends=True)
         if accuracy is not None and (finest := refinement_that_settles(result, trial, model)):
             found = prove(trial, _taker(model, keeper), run, accuracy, finest, budget, progress)
-            tell_accuracy(result, trial, model, dataclasses.replace(found, refinement_share=budget.share))
+            record_accuracy(result, trial, model, dataclasses.replace(found, refinement_share=budget.share))
     if later:
         result.attrs["later"] = json.dumps([[time, changed.parameters()] for time, changed in later])
     return result
@@ -186,12 +186,12 @@ def simulate_many(
     known = [trial if isinstance(trial, scenarios.Trial) else load(trial) for trial in trials]
     found: list[xr.Dataset] = []
     with ThreadPoolExecutor(threads) as pool:
-        begun = [pool.submit(simulate, trial, tethered=tethered, every=every) for trial in known]
+        started = [pool.submit(simulate, trial, tethered=tethered, every=every) for trial in known]
         try:
-            for run in begun:
+            for run in started:
                 found.append(run.result())
                 if progress is not None:
-                    progress(len(found) / len(begun))
+                    progress(len(found) / len(started))
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
@@ -218,7 +218,7 @@ def _as_fine_as_asked(
 
 def _taker(model: Model, keeper: Keeper | None) -> Take:
     """Return what makes a tethered run of a trial for `subzero.simulation.refinement`."""
-    return lambda each, grid, told: run_trial(each, model, True, told, grid=grid, keeper=keeper)
+    return lambda each, grid, reported: run_trial(each, model, True, reported, grid=grid, keeper=keeper)
 
 
 def run_trial(
@@ -265,9 +265,9 @@ def run_trial(
         with pace:
             now = _further(now, grid, min(last, grid.times.size))
         if now.ending == NO_ROOM:
-            if not has_room(4 * max(now.recording.tension.size, now.used)):
+            if not fits_in_memory(4 * max(now.recording.tension.size, now.used)):
                 break
-            live, recording = more_room(now.live, now.recording, now.used)
+            live, recording = enlarged_run(now.live, now.recording, now.used)
             now = now._replace(live=live, recording=recording)
         if kept is not None:
             kept.keep(now, grid.times, grid.stride)
@@ -281,12 +281,12 @@ def run_trial(
     return run_so_far(grid, now.recording, now.behind, now.used, message, completed=completed)
 
 
-def _goes_on(now: Standing, grid: Grid) -> bool:
+def _goes_on(now: RunState, grid: Grid) -> bool:
     """Say whether a run can and may go on."""
     return now.ending in (coupling.FINE, NO_ROOM) and not _took_too_long(now, grid)
 
 
-def _took_too_long(now: Standing, grid: Grid) -> bool:
+def _took_too_long(now: RunState, grid: Grid) -> bool:
     """Say whether a run took more iterations than it may, however many rows were filled at a time."""
     return bool(now.live.now.iterations > grid.iterations)
 
@@ -298,7 +298,7 @@ SPARE_NODES = 64
 """A recording has room for twice the nodes that are expected, and so many more in each row. [-]"""
 
 
-def _begun(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> Standing:
+def _begun(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> RunState:
     """Return a run at its start, of which no row is written yet."""
     longest = float(np.diff(grid.times).max()) / grid.parts
     setup, live = prepare(trial, model, tethered, longest_exchange=longest, room=ROOM)
@@ -306,10 +306,10 @@ def _begun(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> 
     rows = row_of(grid.times.size - 1, grid.stride) + 1
     each = min(4 * live.line.length.size, 2 * most_segments(trial, model) + SPARE_NODES)
     recording = new_recording(rows, rows * each if tethered else 0, grid.times.size)
-    return Standing(setup, live, recording, 0, 0, coupling.FINE)
+    return RunState(setup, live, recording, 0, 0, coupling.FINE)
 
 
-def _further(now: Standing, grid: Grid, last: int) -> Standing:
+def _further(now: RunState, grid: Grid, last: int) -> RunState:
     """Go on until `last` times are behind, or it cannot go on."""
     behind, used, ending = run_rows(
         now.setup, now.live, now.recording, grid.times, now.behind, last, now.used, grid.parts, grid.stride
@@ -317,7 +317,7 @@ def _further(now: Standing, grid: Grid, last: int) -> Standing:
     return now._replace(behind=behind, used=used, ending=ending)
 
 
-def more_room(live: Live, recording: Recording, used: int) -> tuple[Live, Recording]:
+def enlarged_run(live: Live, recording: Recording, used: int) -> tuple[Live, Recording]:
     """Return the same run with twice the room for nodes."""
     capacity = 2 * live.line.length.size
     nodes = 2 * max(recording.tension.size, used + 64 * capacity)

@@ -33,7 +33,7 @@ from subzero.engine.run_state import Live, Orders, Setup
 from subzero.engine.time_loop import ENDING, NO_ROOM, ROW, USED, advance, hold, observe
 from subzero.errors import UserError, real, short
 from subzero.model import Model, load, model_of
-from subzero.simulation.run import WENT_WELL, in_words, more_room
+from subzero.simulation.run import WENT_WELL, enlarged_run, in_words
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -172,7 +172,7 @@ class Simulator:
             ending = advance(held.handle, held.at, count, n, rudder, port, starboard, held.seen)
             if ending != NO_ROOM:
                 break
-            live, recording = more_room(held.live, held.recording, int(held.at[USED]))
+            live, recording = enlarged_run(held.live, held.recording, int(held.at[USED]))
             self._held = Held.of(held.setup, live, recording, held.times, held.at, held.seen)
         self._check_on()
         return self.observation

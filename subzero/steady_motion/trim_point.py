@@ -364,7 +364,7 @@ def _balanced(hull: Vehicle, motion: Motion) -> np.ndarray:
     for share in np.linspace(0.0, 1.0, STEPS + 1):
         found = motion.part(share).solved(guess)
         if found is None:
-            say_how_far(hull, motion.part(reached).state(guess), reached)
+            raise_no_trim(hull, motion.part(reached).state(guess), reached)
         guess, reached = found, share
     return motion.state(guess)
 
@@ -382,7 +382,7 @@ def check_limits(hull: Vehicle, x: np.ndarray) -> None:
         )
 
 
-def say_how_far(hull: Vehicle, x: np.ndarray, share: float) -> NoReturn:
+def raise_no_trim(hull: Vehicle, x: np.ndarray, share: float) -> NoReturn:
     """Raise the error of a motion that has no balance."""
     check_limits(hull, x)
     if share == 0.0:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Standing:
+class SweepProgress:
     """How far a sweep is.
 
     Attributes:
@@ -53,7 +53,7 @@ class Standing:
         return (self.members - self.finished) / self.rate if self.rate > 0.0 else float("inf")
 
 
-Progress = Callable[[Standing], None]
+Progress = Callable[[SweepProgress], None]
 """Told after every batch how far the sweep is."""
 
 
@@ -172,7 +172,7 @@ class _Tally:
         self._finished, self._before = finished, finished
         self._failed, self._begun = store.failures(), monotonic()
         self._slowest, self._seconds = (-1, 0.0), 0.0
-        self._tell()
+        self._report()
 
     def keep(self, members: Sequence[Member]) -> None:
         self._store.add(members)
@@ -182,9 +182,9 @@ class _Tally:
         self._slowest = max(
             self._slowest, *((member.index, member.seconds) for member in members), key=lambda pair: pair[1]
         )
-        self._tell()
+        self._report()
 
-    def _tell(self) -> None:
+    def _report(self) -> None:
         if self._progress is not None:
             count = self._finished - self._before
             rate = count / max(monotonic() - self._begun, 1e-9)
@@ -193,7 +193,7 @@ class _Tally:
 
             slowest = self._slowest if count > 1 and self._slowest[1] > BUDGET_RATIO * others else (-1, 0.0)
             self._progress(
-                Standing(
+                SweepProgress(
                     finished=self._finished,
                     members=self._members,
                     failed=self._failed,

@@ -25,12 +25,12 @@ from subzero.figures.style import (
     time_label,
     width,
 )
-from subzero.results.tables import index_words
+from subzero.results.tables import index_in_words
 from subzero.sweeps.design import Points
 from subzero.sweeps.member import Job
 from subzero.sweeps.outcomes import unit_of
 from subzero.sweeps.result import RANKS, Gathered
-from subzero.sweeps.sensitivity import Effect, words_of
+from subzero.sweeps.sensitivity import Effect, description_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -179,7 +179,7 @@ def _important(points: Points, effects: list[Effect]) -> list[int]:
 def _tornado(points: Points, effects: list[Effect], title: Title) -> Figure:
     """Draw how much each parameter moves each scalar, the greatest on top."""
     scalars = list(dict.fromkeys(effect.scalar for effect in effects))[:MOST_ROWS]
-    method, first, second = words_of(points.design)
+    method, first, second = description_of(points.design)
     figure, panels = sheet(len(scalars), 1, title)
     bars = min(MOST_BARS, len(points.names))
     usual, more = figure.get_figheight(), len(scalars) * 0.12 * max(bars - 5, 0)
@@ -210,7 +210,7 @@ def _tornado(points: Points, effects: list[Effect], title: Title) -> Figure:
 
 def _scalar(name: str) -> str:
     """Return a number of a run in words, without its unit: ``peak_speed_m_s`` is "peak speed"."""
-    return index_words(name).partition(" [")[0].replace(".", ", ")
+    return index_in_words(name).partition(" [")[0].replace(".", ", ")
 
 
 def _short(name: str, most: int = NAME_LENGTH) -> str:

@@ -74,15 +74,15 @@ class Job:
 
     def run(self, first: int, rows: np.ndarray) -> Member:
         """Run a member; `rows` are the values of its parameters (parameters,)."""
-        begun = perf_counter()
+        started = perf_counter()
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # the run keeps its own
                 run, indices = self._run(first, rows)
-            return self._seen(first, run, indices, begun)
+            return self._seen(first, run, indices, started)
         except Exception as error:
-            told = str(error) if isinstance(error, UserError) else f"{type(error).__name__}: {error}"
-            return self.failed(first, told, perf_counter() - begun)
+            reported = str(error) if isinstance(error, UserError) else f"{type(error).__name__}: {error}"
+            return self.failed(first, reported, perf_counter() - started)
 
     def _run(self, index: int, row: np.ndarray) -> tuple[PlainRun, dict[str, float]]:
         """Return the run of a member, and the indices that it is judged by."""
@@ -91,13 +91,13 @@ class Job:
         trial = with_parameters(self.trial, dict(zip(self.names, row.tolist(), strict=True)))
         return simulate_plainly(trial, tethered=self.tethered), {}
 
-    def _seen(self, index: int, run: PlainRun, indices: dict[str, float], begun: float) -> Member:
+    def _seen(self, index: int, run: PlainRun, indices: dict[str, float], started: float) -> Member:
         """Return what is kept of a run."""
         warned = tuple(
             (load["check"], load["message"]) for load in json.loads(run.attrs.get("warnings", "[]"))
         )
         if run.attrs["outcome"] != "completed":
-            return self.failed(index, run.attrs["outcome_message"], perf_counter() - begun, warned)
+            return self.failed(index, run.attrs["outcome_message"], perf_counter() - started, warned)
         return Member(
             index=index,
             reason="",
@@ -105,7 +105,7 @@ class Job:
             scalars=scalars_of(run, self.outcomes.scalars, indices),
             channels=channels_of(run, self.outcomes),
             own=own_numbers(run, self.outcomes.function),
-            seconds=perf_counter() - begun,
+            seconds=perf_counter() - started,
             refinement_share=json.loads(run.attrs["accuracy"]).get("refinement_share", 0.0),
         )
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from subzero.page.report import Answer, Drawn, Line, Report, Section, Table, render
 from subzero.sweeps.outcomes import in_words
 from subzero.sweeps.result import TABLE
-from subzero.sweeps.sensitivity import words_of
+from subzero.sweeps.sensitivity import description_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -81,7 +81,7 @@ def numbers(summary: Summary) -> Table:
 
 def what_matters(summary: Summary) -> Table:
     """Return the parameters that move each scalar most: a group of rows for each."""
-    method, *columns = words_of(summary["design"]["name"])
+    method, *columns = description_of(summary["design"]["name"])
     columns = [column for column in columns if column]
     groups = []
     for scalar in summary["scalars"]:
@@ -142,7 +142,7 @@ def _answers(summary: Summary) -> list[Answer]:
     """Return in words what was varied, what came out, and what matters."""
     found = [Answer(question="What was varied", words=_varied(summary))]
     if summary["scalars"]:
-        found.append(Answer(question="What came out", words=_came_out(summary)))
+        found.append(Answer(question="What came out", words=_outcome_lines(summary)))
     if summary["sensitivity"]["effects"]:
         found.append(Answer(question="What matters most", words=_matters(summary)))
     return found
@@ -161,7 +161,7 @@ def _varied(summary: Summary) -> list[str]:
     ]
 
 
-def _came_out(summary: Summary) -> list[str]:
+def _outcome_lines(summary: Summary) -> list[str]:
     """Return of some scalars where most members lie."""
     return [
         f"{in_words(name).capitalize()}: {_with_unit(row['p50'], row['unit'])} in the middle; "
@@ -172,7 +172,7 @@ def _came_out(summary: Summary) -> list[str]:
 
 def _matters(summary: Summary) -> list[str]:
     """Return of some scalars which parameter moves it most, and how much by the design's own measure."""
-    method, first, _ = words_of(summary["design"]["name"])
+    method, first, _ = description_of(summary["design"]["name"])
     most = {scalar: _effects(summary, scalar)[:1] for scalar in list(summary["scalars"])[:IN_WORDS]}
     return [
         f"{in_words(scalar).capitalize()}: {own[0]['parameter']} ({first} {own[0]['size']:.3g})."

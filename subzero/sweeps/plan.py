@@ -227,13 +227,13 @@ def _dotted(table: Mapping[str, Any], above: str = "") -> dict[str, Any]:
         is_spread = isinstance(inside, Mapping) and any(
             not isinstance(each, Mapping) for each in inside.values()
         )
-        if isinstance(inside, Mapping) and not (is_spread and _says_spread(inside)):
+        if isinstance(inside, Mapping) and not (is_spread and _has_spread(inside)):
             found |= _dotted(inside, f"{name}.")
         else:
             found[name] = inside
     return found
 
 
-def _says_spread(table: Mapping[str, Any]) -> bool:
+def _has_spread(table: Mapping[str, Any]) -> bool:
     """Say whether a table is a spread, and no section without quotes."""
     return any(key in DISTRIBUTION_KEYS for key in table)

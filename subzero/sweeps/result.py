@@ -231,12 +231,12 @@ def _table_row(member: Member, points: Points, found: Gathered) -> Iterable[str]
 
 def percentiles(found: Gathered) -> dict[str, dict[str, float]]:
     """Return what is told of every scalar, of members that did not fail: percentiles, mean, deviation, extremes."""
-    told = {}
+    reported = {}
     for name, column in zip(found.names, found.scalars.T, strict=True):
         values = column[np.isfinite(column)]
         if values.size:
             ranks = np.percentile(values, RANKS)
-            told[name] = {
+            reported[name] = {
                 "members": int(values.size),
                 "mean": float(values.mean()),
                 "standard_deviation": float(values.std(ddof=1)) if values.size > 1 else 0.0,
@@ -244,4 +244,4 @@ def percentiles(found: Gathered) -> dict[str, dict[str, float]]:
                 **{f"p{rank:g}": float(value) for rank, value in zip(RANKS, ranks, strict=True)},
                 "max": float(values.max()),
             }
-    return told
+    return reported

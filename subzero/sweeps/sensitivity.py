@@ -48,7 +48,7 @@ METHODS = {
 CORRELATION = ("Spearman's rank correlation", "correlation", "")
 
 
-def words_of(design: str) -> tuple[str, str, str]:
+def description_of(design: str) -> tuple[str, str, str]:
     """Return what a design's sensitivity is called, and its two numbers."""
     return METHODS.get(design, CORRELATION)
 

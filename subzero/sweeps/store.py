@@ -57,7 +57,7 @@ class Store:
     def finished(self, members: int) -> np.ndarray:
         """Return which of so many members are finished (members,); damaged rows are taken out, to be run again."""
         done, damaged = np.zeros(members, dtype=bool), []
-        with _told(self.path), self._file:
+        with _reported(self.path), self._file:
             for *row, digest in self._file.execute(f"SELECT {COLUMNS}, digest FROM members"):
                 if digest == _digest(row) and row[0] < members:
                     done[row[0]] = True
@@ -86,7 +86,7 @@ class Store:
             )
             for member in members
         ]
-        with _told(self.path), self._file:
+        with _reported(self.path), self._file:
             self._file.execute("BEGIN")
             self._file.executemany(
                 f"INSERT OR IGNORE INTO members ({COLUMNS}, digest) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
@@ -95,7 +95,7 @@ class Store:
 
     def forget_failed(self) -> int:
         """Take out the members that failed, so that they are run again; return how many."""
-        with _told(self.path), self._file:
+        with _reported(self.path), self._file:
             self._file.execute("BEGIN")
             return self._file.execute("DELETE FROM members WHERE reason != ''").rowcount
 
@@ -103,7 +103,7 @@ class Store:
         """Give all members in their order, some at a time."""
         last = -1
         while True:
-            with _told(self.path):
+            with _reported(self.path):
                 rows = self._file.execute(
                     f"SELECT {COLUMNS} FROM members WHERE member > ? ORDER BY member LIMIT {BLOCK}", (last,)
                 ).fetchall()
@@ -114,12 +114,12 @@ class Store:
 
     def failures(self) -> int:
         """Return how many members have failed."""
-        with _told(self.path):
+        with _reported(self.path):
             return int(self._file.execute("SELECT count(*) FROM members WHERE reason != ''").fetchone()[0])
 
     def reasons(self, most: int) -> list[tuple[int, str]]:
         """Return the first members that failed, and why."""
-        with _told(self.path):
+        with _reported(self.path):
             return self._file.execute(
                 f"SELECT member, reason FROM members WHERE reason != '' ORDER BY member LIMIT {most}"
             ).fetchall()
@@ -165,11 +165,11 @@ def opened(folder: Path, manifest: Mapping[str, str], shape: tuple[int, int]) ->
         UserError: it holds another sweep, another command has it, it cannot be written.
     """
     path = folder / FILE
-    with _told(path):
+    with _reported(path):
         folder.mkdir(parents=True, exist_ok=True)
         connection = sqlite3.connect(path, isolation_level=None, timeout=1.0)
     try:
-        with _told(path):
+        with _reported(path):
             connection.execute(
                 "PRAGMA locking_mode = EXCLUSIVE"
             )  # before WAL: then no memory is shared, on any disk
@@ -182,7 +182,7 @@ def opened(folder: Path, manifest: Mapping[str, str], shape: tuple[int, int]) ->
             connection.executescript(TABLES)
             known = dict(connection.execute("SELECT key, value FROM manifest"))
         _refuse_another(path, known, manifest)
-        with _told(path), connection:
+        with _reported(path), connection:
             connection.execute("BEGIN IMMEDIATE")
             connection.executemany("INSERT OR IGNORE INTO manifest VALUES (?, ?)", manifest.items())
         yield Store(connection, path, shape)
@@ -209,7 +209,7 @@ def _refuse_another(path: Path, known: Mapping[str, str], wanted: Mapping[str, s
 
 
 @contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _reported(path: Path) -> Iterator[None]:
     """Turn a refusal of the disk, or of SQLite, into a clean message."""
     name = printable(str(path))
     try:

@@ -170,9 +170,9 @@ def _write_csv(made: Challenge, path: Path) -> None:
     shown = {**record.values, HEADING: record.values[HEADING] % TURN}
     columns = {column_name(TIME.name): record.time} | {column_name(k): v for k, v in shown.items()}
     if commands is not None:
-        told = commands.at(record.time)
+        reported = commands.at(record.time)
         scales = [scale for _, _, scale in REPORTED_COMMANDS.values()]
-        columns |= {column_name(name): told[:, i] * scales[i] for i, name in enumerate(REPORTED_COMMANDS)}
+        columns |= {column_name(name): reported[:, i] * scales[i] for i, name in enumerate(REPORTED_COMMANDS)}
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(columns)

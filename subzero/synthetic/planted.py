@@ -94,8 +94,8 @@ def hide(setting: Setting, effects: Iterable[Effect], tolerances: Deviations, hi
     if hidden.starts:
         models = []
         for time in sorted(set(hidden.starts.values())):
-            begun = {key: hidden.effects[key] for key, at in hidden.starts.items() if at <= time}
-            models.append((time, apply_all(setting, effects, tolerances, at_once, begun).model))
+            started = {key: hidden.effects[key] for key, at in hidden.starts.items() if at <= time}
+            models.append((time, apply_all(setting, effects, tolerances, at_once, started).model))
         true = replace(true, later=tuple(models))
     return hidden.outside.apply(true) if hidden.outside else true
 

@@ -173,7 +173,7 @@ def fouling_grows(draw: Draw) -> UnmodelledForce:
     )
 
 
-def bent_nose(draw: Draw) -> UnmodelledForce:
+def asymmetric_nose(draw: Draw) -> UnmodelledForce:
     """A lateral force at the bow, with the square of the speed."""
     c = draw.force * draw.size(0.1, 0.3)
     terms = Term("Y", "u|u|", c), Term("N", "u|u|", 0.4 * draw.length * c)
@@ -261,7 +261,7 @@ def leak(draw: Draw) -> UnmodelledForce:
 KINDS: dict[str, Callable[[Draw], UnmodelledForce]] = {
     kind.__name__: kind
     for kind in (
-        *(snag, fouling_shed, waves, fouling_grows, bent_nose, pitch_moment),
+        *(snag, fouling_shed, waves, fouling_grows, asymmetric_nose, pitch_moment),
         *(roll_pulse, dying_push, race_yaw, thrust_lost, leak),
     )
 }

@@ -99,8 +99,8 @@ def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -
 @checked_arguments
 def warnings_of(run: AnyRun) -> tuple[RunWarning, ...]:
     """Return the warnings that a run carries in its attributes; none from a version that did not know them."""
-    told = json.loads(run.attrs.get("warnings", "[]"))
-    return tuple(RunWarning(each["check"], each["message"]) for each in told)
+    reported = json.loads(run.attrs.get("warnings", "[]"))
+    return tuple(RunWarning(each["check"], each["message"]) for each in reported)
 
 
 def as_json(warnings: list[RunWarning]) -> str:

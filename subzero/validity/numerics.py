@@ -86,13 +86,13 @@ def resolution(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
         same = "" if change > trial.rtol else ", though with twice as long ones it is the same"
         return [
             f"The tow force depends on steps and segments: {accuracy['proof_finer']} times as fine as these {finer} "
-            f"they change it by {_told(accuracy['proof_error'])} (at {accuracy['proof_time']:g} s; {asked}){same}. "
+            f"they change it by {_percent(accuracy['proof_error'])} (at {accuracy['proof_time']:g} s; {asked}){same}. "
             "Give the drum friction_torque or a [winch], or the cable bending_stiffness."
         ]
     if start > max(trial.rtol, change):
         return [
             f"The tow force of the start depends on steps and segments: four times as fine as these {finer} they "
-            f"change it by {_told(start)} (at {accuracy['start_time']:g} s; {asked}). The cable is jerked out of "
+            f"change it by {_percent(start)} (at {accuracy['start_time']:g} s; {asked}). The cable is jerked out of "
             f"its shape at rest{_start_imbalance(run, trial, model)}, and the samples do not follow how that fades or "
             "rings. Shorten cable_step_s, let these begin gently, or leave the first samples out."
         ]
@@ -101,7 +101,7 @@ def resolution(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
     )
     return [
         f"The tow force depends on steps and segments: from twice as long ones to these {finer} it changes by "
-        f"{_told(change)} (at {accuracy['time']:g} s; {asked}). Either they are "
+        f"{_percent(change)} (at {accuracy['time']:g} s; {asked}). Either they are "
         "still too long, or the problem is ill-posed: a heavy cable, or one in a cross current, on a drum that does "
         "not hold it, or a cable that snaps taut. Give the drum friction_torque or a [winch], or the cable "
         f"bending_stiffness.{spent}"
@@ -130,7 +130,7 @@ def _share(number: float | None) -> float:
     return np.inf if number is None else number
 
 
-def _told(share: float) -> str:
+def _percent(share: float) -> str:
     """Return a change of the force in words."""
     return f"{percent(share)} of its largest value" if np.isfinite(share) else "from stopping to going on"
 
@@ -320,7 +320,8 @@ def slack_shape(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
     accuracy = json.loads(run.attrs["accuracy"])
     return [
         f"{_how_slack(run, share, longest)}: there its shape means nothing. The tow force is not doubted: up to "
-        f"{accuracy['proof_finer']} times as fine, steps and segments change it by {_told(accuracy['force_error'])}."
+        f"{accuracy['proof_finer']} times as fine, steps and segments change it by "
+        f"{_percent(accuracy['force_error'])}."
     ]
 
 

@@ -30,9 +30,9 @@ def test_a_manoeuvre_delivers_both_runs_and_their_indices(tmp_path, capsys):
     summary = json.loads((tmp_path / "z" / "summary.json").read_text())
     _, expected = autopilot.manoeuvre("zigzag", size=12.0, tethered=False)
     assert summary["untethered"]["indices"] == expected
-    told = capsys.readouterr().out
-    assert "overshoot 1 [degree]" in told
-    assert "tethered" in told
+    reported = capsys.readouterr().out
+    assert "overshoot 1 [degree]" in reported
+    assert "tethered" in reported
 
 
 def test_a_manoeuvre_below_the_sea_bed_warns_and_under_strict_exits_with_3(tmp_path, capsys):
@@ -77,10 +77,10 @@ def test_an_autopilot_delivers_a_step(tmp_path, capsys):
         (["autopilot", "heading_step", "--feed-forward", "all"], "Allowed: none, formula, model"),
     ],
 )
-def test_mistakes_are_told_and_write_nothing(words, told, tmp_path, capsys, monkeypatch):
+def test_mistakes_are_told_and_write_nothing(words, reported, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main(words) == MISTAKE
-    assert told in capsys.readouterr().err
+    assert reported in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 

@@ -78,14 +78,14 @@ def test_many_at_once_are_those_of_one_after_another_to_the_last_bit(monkeypatch
     monkeypatch.setattr(subzero.gym_environment, "STEPS", 5)
     name = subzero.gym_environment.ENVIRONMENT
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, (13, 3, 1)).astype(np.float32)
-    told = {}
+    reported = {}
     for mode, how in (("sync", {}), (None, {"workers": workers})):
         made = gymnasium.make_vec(name, num_envs=3, vectorization_mode=mode, propeller_rps=30.0, **how)
-        told[mode] = [(*made.reset(seed=7),), *(made.step(one) for one in actions)]
+        reported[mode] = [(*made.reset(seed=7),), *(made.step(one) for one in actions)]
         made.close()
     assert isinstance(made.unwrapped, subzero.gym_environment.TetheredHeadings)
-    assert any(one[3].all() for one in told[None][1:])
-    for mine, plain in zip(told[None], told["sync"], strict=True):
+    assert any(one[3].all() for one in reported[None][1:])
+    for mine, plain in zip(reported[None], reported["sync"], strict=True):
         for ours, theirs in zip(mine[:-1], plain[:-1], strict=True):
             assert ours.dtype == theirs.dtype
             np.testing.assert_array_equal(ours, theirs)

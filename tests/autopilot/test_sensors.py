@@ -15,7 +15,7 @@ from subzero.autopilot.sensors import UNKNOWN
 STEP = 0.1
 
 
-def told(sensor, truth, seed=0):
+def reported(sensor, truth, seed=0):
     """Return what a sensor tells of a truth that is given every 0.1 s."""
     sensors = Sensors([sensor], seed=seed)
     readings = [
@@ -29,28 +29,28 @@ RAMP = np.arange(50.0)
 
 
 def test_a_perfect_sensor_tells_the_truth():
-    assert np.array_equal(told(Sensor(channel="depth"), RAMP), RAMP)
+    assert np.array_equal(reported(Sensor(channel="depth"), RAMP), RAMP)
 
 
 def test_a_period_holds_samples():
-    held = told(Sensor(channel="depth", period=0.3), RAMP)
+    held = reported(Sensor(channel="depth", period=0.3), RAMP)
     assert np.array_equal(held, 3.0 * np.floor(RAMP / 3.0))
 
 
 def test_a_delay_tells_late_and_the_first_sample_at_once():
-    late = told(Sensor(channel="heading", delay=0.5), RAMP)
+    late = reported(Sensor(channel="heading", delay=0.5), RAMP)
     assert np.array_equal(late, np.maximum(RAMP - 5.0, 0.0))
 
 
 def test_bias_and_quantum():
-    assert np.array_equal(told(Sensor(channel="roll", bias=0.25), RAMP), RAMP + 0.25)
-    coarse = told(Sensor(channel="roll", quantum=4.0), RAMP)
+    assert np.array_equal(reported(Sensor(channel="roll", bias=0.25), RAMP), RAMP + 0.25)
+    coarse = reported(Sensor(channel="roll", quantum=4.0), RAMP)
     assert np.all(np.abs(coarse - RAMP) <= 2.0)
     assert np.array_equal(coarse % 4.0, np.zeros(50))
 
 
 def test_noise_is_white_with_its_standard_deviation():
-    noise = told(Sensor(channel="yaw_rate", noise=0.3), np.zeros(20_000))
+    noise = reported(Sensor(channel="yaw_rate", noise=0.3), np.zeros(20_000))
     assert np.std(noise) == pytest.approx(0.3, rel=4 / np.sqrt(2 * 20_000))
     assert abs(np.mean(noise)) < 4 * 0.3 / np.sqrt(20_000)
     assert abs(np.corrcoef(noise[1:], noise[:-1])[0, 1]) < 4 / np.sqrt(20_000)
@@ -58,13 +58,13 @@ def test_noise_is_white_with_its_standard_deviation():
 
 def test_drift_grows_with_the_square_root_of_time():
     ends = np.array(
-        [told(Sensor(channel="yaw_rate", drift=0.2), np.zeros(41), seed)[-1] for seed in range(600)]
+        [reported(Sensor(channel="yaw_rate", drift=0.2), np.zeros(41), seed)[-1] for seed in range(600)]
     )
     assert np.std(ends) == pytest.approx(0.2 * np.sqrt(4.0), rel=4 / np.sqrt(2 * 600))
 
 
 def test_lost_samples_leave_the_last_one_standing():
-    kept = told(Sensor(channel="depth", drop_out=0.3), np.arange(10_000.0))
+    kept = reported(Sensor(channel="depth", drop_out=0.3), np.arange(10_000.0))
     lost = np.mean(np.diff(kept) == 0.0)
     assert lost == pytest.approx(0.3, abs=4 * np.sqrt(0.21 / 10_000))
     assert set(kept) <= set(np.arange(10_000.0))

@@ -121,8 +121,8 @@ def test_a_run_that_cannot_go_on_stops_with_what_it_has():
         ("fig5", {}, "nothing to command"),
     ],
 )
-def test_what_cannot_be_stepped_is_refused(scenario, options, told):
-    with pytest.raises(subzero.UserError, match=told):
+def test_what_cannot_be_stepped_is_refused(scenario, options, reported):
+    with pytest.raises(subzero.UserError, match=reported):
         subzero.Simulator(scenario, **options)
 
 
@@ -170,11 +170,11 @@ def test_the_stepper_runs_without_the_compiler_too():
         "import subzero; sim = subzero.Simulator('fig6', tethered=False);"
         "print([sim.step() for _ in range(20)][-1].surge_speed.hex())"
     )
-    told = [
+    reported = [
         subprocess.run(
             [sys.executable, "-c", script], capture_output=True, text=True, check=True,
             env=os.environ | {"NUMBA_DISABLE_JIT": off},
         ).stdout.strip()
         for off in ("0", "1")
     ]  # fmt: skip
-    assert float.fromhex(told[0]) == pytest.approx(float.fromhex(told[1]), rel=1e-12)
+    assert float.fromhex(reported[0]) == pytest.approx(float.fromhex(reported[1]), rel=1e-12)

@@ -132,8 +132,8 @@ def test_a_turn_with_a_jammed_rudder_is_refused(model):
         ({"speed": 1.0, "wet_length": 5000.0}, "propeller would need"),
     ],
 )
-def test_what_cannot_be_trimmed_is_told_with_its_limit(model, asked, told):
-    with pytest.raises(autopilot.NoTrimError, match=told):
+def test_what_cannot_be_trimmed_is_told_with_its_limit(model, asked, reported):
+    with pytest.raises(autopilot.NoTrimError, match=reported):
         autopilot.trim(model, **asked)
 
 
@@ -146,8 +146,8 @@ def test_what_cannot_be_trimmed_is_told_with_its_limit(model, asked, told):
         ({"speed": 1.0, "cable": "magic"}, "formula, model"),
     ],
 )
-def test_numbers_that_mean_nothing_are_refused(model, asked, told):
-    with pytest.raises(subzero.UserError, match=told):
+def test_numbers_that_mean_nothing_are_refused(model, asked, reported):
+    with pytest.raises(subzero.UserError, match=reported):
         autopilot.trim(model, **asked)
 
 

@@ -75,8 +75,8 @@ def test_a_log_has_every_number_of_every_channel_but_gaps(run, tmp_path):
         np.testing.assert_array_equal(values, run[channel.name])
     assert [channel.column not in rows[7][1] for channel in CHANNELS].count(True) == 1
     assert about["scenario_text"] == run.attrs["scenario_text"]
-    ((at, told),) = topics["/log"]
-    assert (round(at, 9), told["message"]) == (30.0, "slack: Some of it is folded.")
+    ((at, reported),) = topics["/log"]
+    assert (round(at, 9), reported["message"]) == (30.0, "slack: Some of it is folded.")
 
 
 def turned(transform, vector):

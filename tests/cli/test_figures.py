@@ -44,8 +44,8 @@ def test_figure_6_shows_where_the_rudder_is_beside_its_command_and_whether_that_
     crooked, fed_back = make_run(), make_run(tethered=False)
     crooked["rudder_angle"] = crooked["rudder_command"] + 1.0
     fed_back["rudder_angle"] = fed_back["rudder_command"]
-    told = '"vehicle": {"rudder_servo": {"position_feedback": 1.0}}'
-    fed_back.attrs["parameters"] = fed_back.attrs["parameters"].replace('"vehicle": {}', told)
+    reported = '"vehicle": {"rudder_servo": {"position_feedback": 1.0}}'
+    fed_back.attrs["parameters"] = fed_back.attrs["parameters"].replace('"vehicle": {}', reported)
     panel = draw({"tethered": crooked, "untethered": fed_back})["fig6"].axes[2]
     commanded = line(panel, "commanded").get_ydata()
     assert_allclose(line(panel, "actual, without feedback").get_ydata(), commanded + 1.0)
@@ -156,7 +156,7 @@ def test_a_run_that_stopped_at_once_can_be_drawn(prescribed, make_run, tmp_path)
 
 def test_a_drum_that_moves_is_drawn_with_its_way_and_a_winch_with_what_it_does(make_run):
     run = make_run(prescribed="dive")
-    told = run.attrs["parameters"].replace('"current"', '"vessel": {"time": [0.0]}, "current"')
+    reported = run.attrs["parameters"].replace('"current"', '"vessel": {"time": [0.0]}, "current"')
     still = draw({"tethered": run})
     assert "deployment" not in still
     assert still["cable"].axes[0].get_xlabel() == "east of the drum [m]"
@@ -165,7 +165,7 @@ def test_a_drum_that_moves_is_drawn_with_its_way_and_a_winch_with_what_it_does(m
     for k, nodes in enumerate(run["node_count"].values):
         place[k, nodes - 1, 0] = way[k]
     run["cable_position"] = (run["cable_position"].dims, place)
-    figures = draw({"tethered": run.assign_attrs(parameters=told)})
+    figures = draw({"tethered": run.assign_attrs(parameters=reported)})
     assert figures["cable"].axes[0].get_xlabel() == "east of the vessel's start [m]"
     for axes in (figures["cable"].axes[0], figures["deployment"].axes[3]):
         assert any(np.array_equal(one.get_ydata(), way) for one in axes.get_lines())
@@ -182,8 +182,8 @@ def test_a_run_longer_than_the_papers_shows_the_cable_up_to_its_end(make_run):
 def test_a_straight_course_has_an_exact_tension_only_on_a_free_drum_in_still_water(besides, make_run):
     run = make_run(prescribed="straight")
     assert "fig4" in draw({"tethered": run})
-    told = run.attrs["parameters"].replace('"current"', f'{besides}, "current"')
-    assert "fig4" not in draw({"tethered": run.assign_attrs(parameters=told)})
+    reported = run.attrs["parameters"].replace('"current"', f'{besides}, "current"')
+    assert "fig4" not in draw({"tethered": run.assign_attrs(parameters=reported)})
 
 
 def test_an_untethered_prescribed_run_has_nothing_to_show(make_run):

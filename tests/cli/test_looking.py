@@ -64,8 +64,8 @@ def test_completion_knows_every_command(shell, capsys):
 
 
 def test_new_makes_a_file_that_is_valid_and_leaves_one_that_exists(here, capsys):
-    told = said(capsys, "new", "my_trial.toml").out
-    assert "subzero compare my_trial.toml" in told
+    reported = said(capsys, "new", "my_trial.toml").out
+    assert "subzero compare my_trial.toml" in reported
     assert scenarios.load("my_trial.toml").commands is not None
     before = (here / "my_trial.toml").read_text()
     assert "exists and is left alone" in said(capsys, "new", "my_trial.toml", code=MISTAKE).err
@@ -76,8 +76,8 @@ def test_new_makes_a_file_that_is_valid_and_leaves_one_that_exists(here, capsys)
 def test_everything_shipped_can_be_the_beginning_of_a_file_that_is_valid(kind, here, capsys):
     for name in shipped(kind):
         said(capsys, "new", f"{name}.toml", "--like", name)
-        told = said(capsys, "validate", f"{name}.toml").out
-        assert told.startswith(f"{name}.toml is a valid {kind.removesuffix('s')}")
+        reported = said(capsys, "validate", f"{name}.toml").out
+        assert reported.startswith(f"{name}.toml is a valid {kind.removesuffix('s')}")
 
 
 @pytest.mark.parametrize(
@@ -94,16 +94,16 @@ def test_everything_shipped_can_be_the_beginning_of_a_file_that_is_valid(kind, h
     ],
 )
 def test_what_cannot_be_is_refused_and_leaves_nothing(words, why, here, capsys):
-    told = said(capsys, *words, code=MISTAKE)
-    assert why in told.err
-    assert told.out == ""
+    reported = said(capsys, *words, code=MISTAKE)
+    assert why in reported.err
+    assert reported.out == ""
     assert list(here.iterdir()) == []
 
 
 def test_show_tells_every_number_of_a_part_with_its_range_and_source(here, capsys):
     table = tomllib.loads(shipped_path("cables", "table1").read_text(encoding="utf-8"))
-    told = json.loads(said(capsys, "show", "table1", "--json").out)
-    shown = {one["name"]: one for one in told["numbers"]}
+    reported = json.loads(said(capsys, "show", "table1", "--json").out)
+    shown = {one["name"]: one for one in reported["numbers"]}
     for section, leaves in table.items():
         for key, leaf in leaves.items():
             one = shown.pop(f"{section}.{key}")
@@ -116,11 +116,11 @@ def test_show_tells_every_number_of_a_part_with_its_range_and_source(here, capsy
 
 
 def test_show_of_a_trial_has_its_values_and_says_where_the_rest_stands(here, capsys):
-    told = said(capsys, "show", "fig6").out
-    assert "heading_deg" in told
-    assert "27 degree  -360 … 360\n      heading, clockwise from north" in told
-    assert "subzero show subzero2" in told
-    assert max(map(len, told.splitlines())) <= 80
+    reported = said(capsys, "show", "fig6").out
+    assert "heading_deg" in reported
+    assert "27 degree  -360 … 360\n      heading, clockwise from north" in reported
+    assert "subzero show subzero2" in reported
+    assert max(map(len, reported.splitlines())) <= 80
 
 
 def test_validate_tells_all_problems_with_their_lines(here, capsys):
@@ -128,10 +128,10 @@ def test_validate_tells_all_problems_with_their_lines(here, capsys):
     (here / "bad.toml").write_text(
         text.replace("= 30.0 ", "= -30.0 ").replace("depth_m = 1.0", "deth_m = 1.0")
     )
-    told = said(capsys, "validate", "bad.toml", code=MISTAKE).err
-    assert "2 problems" in told
-    assert "line 18" in told or "line 1" in told
-    assert "depth_m" in told
+    reported = said(capsys, "validate", "bad.toml", code=MISTAKE).err
+    assert "2 problems" in reported
+    assert "line 18" in reported or "line 1" in reported
+    assert "depth_m" in reported
 
 
 @pytest.mark.parametrize(
@@ -159,8 +159,8 @@ def test_names_with_markup_and_mathematics_are_text(here, capsys):
     line = next(line for line in text.splitlines() if line.startswith("description"))
     (here / "strange.toml").write_text(text.replace(line, f'description = "{STRANGE}"'), encoding="utf-8")
     for command in ("validate", "show"):
-        told = "".join(said(capsys, command, "strange.toml").out.split())
-        assert "<b>x</b>$\\frac$[bold]Zürich[/bold]日本" in told
+        reported = "".join(said(capsys, command, "strange.toml").out.split())
+        assert "<b>x</b>$\\frac$[bold]Zürich[/bold]日本" in reported
 
 
 # Commands as a run writes them.
@@ -196,8 +196,8 @@ def test_the_rule_of_the_last_row_is_said_the_same_everywhere():
 
 
 def test_json_is_one_object_and_it_is_the_summary(here, rails, capsys):
-    told = said(capsys, "compare", "fig6", "--json")
-    summary = json.loads(told.out)
+    reported = said(capsys, "compare", "fig6", "--json")
+    summary = json.loads(reported.out)
     on_disk = json.loads((here / "fig6" / "summary.json").read_text(encoding="utf-8"))
     assert {key: summary[key] for key in on_disk} == on_disk
     assert summary["folder"] == "fig6"
@@ -205,16 +205,16 @@ def test_json_is_one_object_and_it_is_the_summary(here, rails, capsys):
 
 
 def test_quiet_prints_nothing_and_writes_all(here, rails, capsys):
-    told = said(capsys, "simulate", "fig6", "--quiet")
-    assert (told.out, told.err) == ("", "")
+    reported = said(capsys, "simulate", "fig6", "--quiet")
+    assert (reported.out, reported.err) == ("", "")
     assert (here / "fig6" / "tethered.nc").exists()
 
 
 def test_verbose_says_what_runs_and_how_long_it_took(here, rails, capsys):
-    told = said(capsys, "simulate", "fig6", "-v")
-    assert told.err.startswith("subzero ")
-    assert " s in all." in told.err
-    assert "Wrote fig6/" in told.out
+    reported = said(capsys, "simulate", "fig6", "-v")
+    assert reported.err.startswith("subzero ")
+    assert " s in all." in reported.err
+    assert "Wrote fig6/" in reported.out
 
 
 def test_a_mistake_is_told_also_quietly(here, capsys):
@@ -226,12 +226,12 @@ def test_a_mistake_is_told_also_quietly(here, capsys):
 
 def test_plot_draws_what_is_asked_for_beside_the_run(here, rails, capsys):
     said(capsys, "simulate", "fig6", "--quiet")
-    told = said(capsys, "plot", "fig6/tethered.nc", "--what", "tension", "heading", "--format", "svg").out
+    reported = said(capsys, "plot", "fig6/tethered.nc", "--what", "tension", "heading", "--format", "svg").out
     for name in ("tension", "heading"):
-        assert f"tethered_{name}.svg" in told
+        assert f"tethered_{name}.svg" in reported
         assert (here / "fig6" / f"tethered_{name}.svg").read_text(encoding="utf-8").count("<svg") == 1
-    told = said(capsys, "plot", "fig6/tethered.nc", "--what", "tensoin", code=MISTAKE).err
-    assert "Did you mean 'tension'?" in told
+    reported = said(capsys, "plot", "fig6/tethered.nc", "--what", "tensoin", code=MISTAKE).err
+    assert "Did you mean 'tension'?" in reported
 
 
 # The scenario is positional everywhere.
@@ -242,19 +242,19 @@ def test_plot_draws_what_is_asked_for_beside_the_run(here, rails, capsys):
     ["diagnose", "fig66.toml", "record.csv"], ["simulate", "fig66"], ["compare", "fig66"],
 ])  # fmt: skip
 def test_a_scenario_stands_in_its_place_without_a_name(words, here, capsys):
-    told = said(capsys, *words, code=MISTAKE).err
-    assert "there is no such" in told
-    assert "fig66" in told
+    reported = said(capsys, *words, code=MISTAKE).err
+    assert "there is no such" in reported
+    assert "fig66" in reported
 
 
 def test_two_scenarios_are_refused(here, capsys):
-    told = said(capsys, "diagnose", "fig6", "zigzag", "record.csv", code=MISTAKE).err
-    assert "One scenario is flown, and these are several: fig6, zigzag." in told
+    reported = said(capsys, "diagnose", "fig6", "zigzag", "record.csv", code=MISTAKE).err
+    assert "One scenario is flown, and these are several: fig6, zigzag." in reported
 
 
 def test_a_folder_named_after_the_scenario_does_not_stand_in_its_place(here, capsys):
     """`subzero compare fig6` leaves the folder fig6; the name beside a record is still the scenario."""
     (here / "fig6").mkdir()
     (here / "record.csv").write_text("time_s,surge_speed_m_s\n0,oops\n")
-    told = said(capsys, "diagnose", "fig6", "record.csv", code=MISTAKE).err
-    assert "'oops' is not a number" in told
+    reported = said(capsys, "diagnose", "fig6", "record.csv", code=MISTAKE).err
+    assert "'oops' is not a number" in reported

@@ -241,7 +241,7 @@ def test_the_files_given_to_a_command_are_what_is_simulated(rails, tmp_path, mon
     )
     assert main(["simulate", "fig6", "--motion", "log.csv", "--out", "moved"]) == FINE
     assert main(["simulate", "fig6", "--commands", "told.csv", "--untethered", "--out", "told"]) == FINE
-    (moved, tethered), (told, bare) = rails
+    (moved, tethered), (reported, bare) = rails
     assert (tethered, bare) == (True, False)
     assert_allclose(moved.motion.surge_speed, 0.7)
-    assert_allclose(told.commands.at(10.0), [12.5, 0.0, 0.0, 0.0])
+    assert_allclose(reported.commands.at(10.0), [12.5, 0.0, 0.0, 0.0])

@@ -176,7 +176,7 @@ def test_an_interrupt_after_the_last_move_is_told_as_it_is(tmp_path, rails, monk
     def interrupted(*_, **__):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("subzero.cli.write_results.tell", interrupted)
+    monkeypatch.setattr("subzero.cli.write_results.print_results", interrupted)
     assert simulate(tmp_path) == INTERRUPTED
     assert capsys.readouterr().err.endswith(f"Interrupted; all files were written to {tmp_path}.\n")
 
@@ -190,10 +190,10 @@ def test_a_command_says_nothing_of_a_former_one_in_the_same_process(tmp_path, ra
     def broken(*_, **__):
         raise RuntimeError("a bug")
 
-    monkeypatch.setattr("subzero.cli.write_results.tell", broken)
+    monkeypatch.setattr("subzero.cli.write_results.print_results", broken)
     with pytest.raises(RuntimeError, match="a bug"):
         simulate(tmp_path)
-    interrupts.say_interrupted()
+    interrupts.print_interrupted()
     assert "members" not in capsys.readouterr().err
 
 

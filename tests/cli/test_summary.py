@@ -110,9 +110,9 @@ def test_a_comparison_tells_its_progress_once_from_0_to_1(rails, make_run, monke
     monkeypatch.setattr(sys.modules["subzero.simulation.run"], "simulate", simulate)
     from subzero.simulation.comparison import compare
 
-    told: list[float] = []
-    comparison = compare("fig6", progress=told.append)
-    assert told == [0.25, 0.5, 0.75, 1.0]
+    reported: list[float] = []
+    comparison = compare("fig6", progress=reported.append)
+    assert reported == [0.25, 0.5, 0.75, 1.0]
     assert (comparison.tethered.attrs["tethered"], comparison.untethered.attrs["tethered"]) == (1, 0)
     assert comparison.summary()["untethered"]["largest_cable_force_N"] == 0.0
     assert comparison.fits() == {}

@@ -14,6 +14,6 @@ MODULES = (
 
 @pytest.mark.parametrize("name", MODULES)
 def test_the_examples_of_a_docstring_run(name):
-    told = doctest.testmod(import_module(name), optionflags=doctest.ELLIPSIS)
-    assert told.attempted > 1
-    assert told.failed == 0
+    reported = doctest.testmod(import_module(name), optionflags=doctest.ELLIPSIS)
+    assert reported.attempted > 1
+    assert reported.failed == 0

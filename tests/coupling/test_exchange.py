@@ -157,10 +157,10 @@ def test_commands_are_held_between_samples(simulate, trial_of):
     times, rudder = np.array([0.0, 1.0, 2.06]), np.array([0.0, 0.1, -0.1])
     values = np.column_stack([np.full(3, 25.0), rudder, np.zeros(3), np.zeros(3)])
     run = simulate(trial_of(commands=scenarios.Commands(time=times, values=values), duration=4.0))
-    told = run["rudder_command"].values
-    assert_allclose(told[:10], 0.0, atol=1e-12)
-    assert_allclose(told[10:21], np.degrees(0.1), rtol=1e-12)
-    assert_allclose(told[21:], -np.degrees(0.1), rtol=1e-12)
+    reported = run["rudder_command"].values
+    assert_allclose(reported[:10], 0.0, atol=1e-12)
+    assert_allclose(reported[10:21], np.degrees(0.1), rtol=1e-12)
+    assert_allclose(reported[21:], -np.degrees(0.1), rtol=1e-12)
     later = values.copy()
     later[2, 1] = 0.1
     held = simulate(trial_of(commands=scenarios.Commands(time=times, values=later), duration=4.0))

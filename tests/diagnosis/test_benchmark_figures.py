@@ -69,8 +69,8 @@ def test_a_share_that_is_too_large_is_judged_from_above():
 
 @pytest.mark.parametrize(("right", "error"), [(9, 0.0), (5, 0.4), (10, 0.1)])
 def test_calibration_error_is_the_gap_between_stated_and_right(right, error):
-    told = [a_result({"a": 20.0}, {"a" if i < right else "b": 0.9}) for i in range(10)]
-    assert scores.calibration(told)[1] == pytest.approx(error, abs=1e-12)
+    reported = [a_result({"a": 20.0}, {"a" if i < right else "b": 0.9}) for i in range(10)]
+    assert scores.calibration(reported)[1] == pytest.approx(error, abs=1e-12)
 
 
 def test_chance_makes_of_calibration_what_the_binomial_law_says():
@@ -117,10 +117,10 @@ def test_a_name_is_wrong_if_it_is_wrong_in_being_from_then_on():
 
 def test_figures_of_what_begins_in_mid_trial():
     late = {"causes": [{"id": "a", "p": 0.97, "start": 12.8, "parameters": {"x": [1.1, 0.8, 1.4, 0.15]}}]}
-    told = [sudden({"a@12.8": 0.97}, **late), sudden({"b@3": 0.6, "a@12": 0.4}), sudden({"none": 0.9})]
+    reported = [sudden({"a@12.8": 0.97}, **late), sudden({"b@3": 0.6, "a@12": 0.4}), sudden({"none": 0.9})]
     found = {
         score.words: score.value
-        for score in rows(told)
+        for score in rows(reported)
         if "mid-trial" in score.words or "when it" in score.words
     }
     assert found["from mid-trial on, D ≥ 16: right name first"] == "33.3 %"

@@ -51,9 +51,9 @@ def test_the_record_can_be_read_and_says_nothing_of_the_answer(made):
     assert set(BASIC) < set(record.values)
     for name in BASIC:
         assert_allclose(record.values[name], what.record.values[name], rtol=1e-6, atol=1e-9)
-    told = "".join(path.read_text() for path in folder.iterdir())
+    reported = "".join(path.read_text() for path in folder.iterdir())
     assert what.answer.names
-    assert what.answer.names[0] not in told
+    assert what.answer.names[0] not in reported
 
 
 def test_the_answer_is_told_as_it_was_hidden(made):

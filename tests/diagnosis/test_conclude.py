@@ -91,9 +91,9 @@ def test_an_interval_is_that_of_the_scale_that_is_believed(sure):
     fit = SimpleNamespace(z=found.z, quadratic=Quadratic.at(found.z, r - J @ found.z, J))
     log = {kappa: 0.0 if kappa == sure else -500.0 for kappa in (1.0, 2.0, 4.0)}
     one = Candidate(ids=ids, fit=fit, log_evidence=log, log_posterior=0.0)
-    told = deviations(SimpleNamespace(problem=SimpleNamespace(entries=entries)), one)
+    reported = deviations(SimpleNamespace(problem=SimpleNamespace(entries=entries)), one)
     tolerance = np.array([entry.parameter.tolerance for entry in entries])
-    assert_allclose([sd for _, sd in told.values()] * tolerance, np.sqrt(np.diag(found.M)), rtol=1e-8)
+    assert_allclose([sd for _, sd in reported.values()] * tolerance, np.sqrt(np.diag(found.M)), rtol=1e-8)
 
 
 def test_a_drift_is_told_with_the_cause_beside_it_that_it_needs_and_without_one_that_it_does_not():

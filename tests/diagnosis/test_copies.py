@@ -11,7 +11,7 @@ NATURAL = 0.15
 """Probabilities may differ by this much: fits are continued until they gain less than half a nat."""
 
 
-def told(logged):
+def reported(logged):
     return subzero.diagnose(logged, budget="verdict")
 
 
@@ -26,7 +26,7 @@ def test_a_copy_has_the_verdict_the_name_and_about_the_probability_of_the_origin
     drawn = world.drawn(10301, index + 1)[index]
     logged, _ = world.record_of(drawn)
     shaken, _ = world.record_of(drawn, np.random.default_rng([10301, index, 9, copy]))
-    one, *copies = [told(each) for each in (logged, with_digits(logged), shaken)]
+    one, *copies = [reported(each) for each in (logged, with_digits(logged), shaken)]
     first = next(iter(one.probabilities))
     for each in copies:
         assert (each.verdict, next(iter(each.probabilities))) == (one.verdict, first)

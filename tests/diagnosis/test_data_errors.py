@@ -57,10 +57,10 @@ EACH = (
 
 def smooth(scenario: str = "fig6") -> Logged:
     """Return a record of smooth curves, another in each channel."""
-    told = scenarios.Commands(
+    reported = scenarios.Commands(
         time=np.array([0.0, 10.0]), values=np.array([[25.0, 0.0, 0.1, 0.1], [20.0, 0.05, -0.1, 0.02]])
     )
-    trial = dataclasses.replace(subzero.load_scenario(scenario), commands=told)
+    trial = dataclasses.replace(subzero.load_scenario(scenario), commands=reported)
     values = {name: (1.0 + k) * np.sin(0.3 * TIME + k) + 0.1 * TIME for k, name in enumerate(CHANNELS)}
     values["heading"] = values["heading"] + 150.0 + 3.0 * TIME  # beyond south
     setting = Setting(trial=trial, model=subzero.Model.of(trial))
@@ -81,9 +81,9 @@ def test_a_correction_undoes_its_error(error):
     changed = any(
         not np.array_equal(wrong.record.values[name], before.record.values[name]) for name in CHANNELS
     )
-    told = wrong.setting.trial.commands.values, before.setting.trial.commands.values
-    assert changed or not np.array_equal(*told)
-    assert_allclose(after.setting.trial.commands.values, told[1], atol=1e-12)
+    reported = wrong.setting.trial.commands.values, before.setting.trial.commands.values
+    assert changed or not np.array_equal(*reported)
+    assert_allclose(after.setting.trial.commands.values, reported[1], atol=1e-12)
     for name in CHANNELS:
         known = np.isfinite(after.record.values[name])
         true = np.interp(after.record.time[known], TIME, before.record.values[name])
@@ -149,9 +149,9 @@ def test_two_errors_at_once_are_named_at_the_public_face_and_nothing_is_converte
     assert {one.columns for one in verdict.data_errors} == {("heading_deg",), ("depth_m",)}
     assert {"sign:heading", "unit:depth=feet"} <= set(next(iter(verdict.probabilities)).split(" + "))
     assert_allclose(wrong.record.values["heading"], before)
-    told = json.loads(report.json_file.text(verdict))
-    assert told["verdict"] == "data_error"
-    assert told["data_errors"][0]["remedy"]
+    reported = json.loads(report.json_file.text(verdict))
+    assert reported["verdict"] == "data_error"
+    assert reported["data_errors"][0]["remedy"]
     assert "heading_deg has the other sign" in report.words.sentence(verdict)
 
 

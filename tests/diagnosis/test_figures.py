@@ -82,13 +82,13 @@ def drawn(verdict):
 
 def check(row):
     verdict = verdict_of(row)
-    shown, told = drawn(verdict), report.json_file.mapping(verdict)
+    shown, reported = drawn(verdict), report.json_file.mapping(verdict)
     ranked = sorted(row["probabilities"].items(), key=lambda item: -item[1])
     for (name, width, _), (hypothesis, p) in zip(shown, ranked, strict=False):
-        assert width == p == told["probabilities"][hypothesis]
-        assert name.lower() == told["explanations"][hypothesis].lower()
+        assert width == p == reported["probabilities"][hypothesis]
+        assert name.lower() == reported["explanations"][hypothesis].lower()
     said = {one.question: " ".join(one.words).lower() for one in report.summary(verdict)}
-    assert said == {one["question"]: " ".join(one["words"]).lower() for one in told["summary"]}
+    assert said == {one["question"]: " ".join(one["words"]).lower() for one in reported["summary"]}
     names = [name.lower() for name, *_ in shown]
     blue = [name for name, (_, _, colour) in zip(names, shown, strict=True) if colour[:3] == rgb(BLUE)]
     if verdict.verdict == UNDECIDED:

@@ -51,7 +51,7 @@ def along(setting):
     }
 
 
-def told(estimated, force, axis="X", sd=0.02):
+def reported(estimated, force, axis="X", sd=0.02):
     """Return the formula of a force (n,) that data measure at knots, with noise."""
     knots = estimated.unknown.time
     hats = np.maximum(1.0 - np.abs(np.subtract.outer(TIMES, knots)) / (knots[1] - knots[0]), 0.0)
@@ -65,7 +65,7 @@ def told(estimated, force, axis="X", sd=0.02):
 @pytest.mark.parametrize("feature", ["u|u|", "wet_length", "time*u2", "n u"])
 def test_the_feature_is_found_with_its_coefficient(estimated, features, feature):
     c = -0.5 / np.abs(features[feature]).max()
-    found = told(estimated, c * features[feature])
+    found = reported(estimated, c * features[feature])
     words, name, best, low, high = found.terms()[0]
     assert name == feature
     assert words == FEATURES[feature].words
@@ -75,7 +75,7 @@ def test_the_feature_is_found_with_its_coefficient(estimated, features, feature)
 
 def test_a_window_is_found(estimated, features):
     force = -0.6 * features["u|u|"] * ((TIMES >= 9.0) & (TIMES < 17.0))
-    found = told(estimated, force)
+    found = reported(estimated, force)
     assert (found.shapes[0].start, found.shapes[0].end) == (9.0, 17.0)
     assert "from 9 to 17 s" in found.terms()[0][0]
     assert np.sqrt(np.mean((found.force() - force) ** 2)) < 0.1 * 0.6
@@ -90,14 +90,14 @@ def test_a_window_is_never_moved_to_where_its_feature_does_nothing(estimated):
     record = dataclasses.replace(problem.records[0], setting=setting)
     other = dataclasses.replace(estimated, problem=dataclasses.replace(problem, records=(record,)))
     force = 3.0 * along(setting)["rudder_angle*u2"] * (TIMES < 5.0)
-    found = told(other, force, "N", sd=0.001)
+    found = reported(other, force, "N", sd=0.001)
     assert found.terms()[0][1] == "rudder_angle*u2"
     assert np.isfinite(found.log_gain)
     assert found.shapes[0].end == pytest.approx(5.0, abs=0.3)
 
 
 def test_a_wave_is_called_a_wave(estimated):
-    found = told(estimated, 0.3 * np.sin(2.0 * np.pi * TIMES / 5.0 + 1.0), "Y")
+    found = reported(estimated, 0.3 * np.sin(2.0 * np.pi * TIMES / 5.0 + 1.0), "Y")
     words, name, amplitude, *_ = found.terms()[0]
     assert (found.axis, name, words) == ("Y", "wave", "a wave with a period of 5 s")
     assert amplitude == pytest.approx(0.3, rel=0.1)
@@ -117,11 +117,11 @@ def test_a_push_that_rises_and_falls_is_no_box(estimated):
     """Half a sine squared, which is neither of the two: a box in its place would act before and behind it."""
     inside = np.clip((TIMES - 9.0) / 6.0, 0.0, 1.0)
     push = 0.3 * np.sin(np.pi * inside) ** 2
-    found = told(estimated, push, "Y")
+    found = reported(estimated, push, "Y")
     (shape,) = found.shapes
     assert shape.is_gradual
     assert "rising and falling from" in shape.words
     assert (shape.start, shape.end) == pytest.approx((9.0, 15.0), abs=1.0)
     assert np.abs(found.force() - push).max() < 0.06
-    box = told(estimated, np.where((TIMES >= 9.0) & (TIMES < 15.0), 0.3, 0.0), "Y").shapes[0]
+    box = reported(estimated, np.where((TIMES >= 9.0) & (TIMES < 15.0), 0.3, 0.0), "Y").shapes[0]
     assert not box.is_gradual

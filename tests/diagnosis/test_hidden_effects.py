@@ -63,7 +63,7 @@ def both_signs():
 
 
 @pytest.fixture(scope="module")
-def told(request):
+def reported(request):
     """Return the results of the cases that this session asks for, by two processes side by side."""
     here = [item for item in request.session.items if item.path == request.path]
     asked = {item.callspec.params["case"] for item in here if hasattr(item, "callspec")}
@@ -94,38 +94,38 @@ MORE = slow("single", 8, 11, 13, 16, 20, 25)
 
 
 @pytest.mark.parametrize("case", SINGLES + LONG + MORE)
-def test_a_hidden_effect_gets_no_wrong_name(told, case):
+def test_a_hidden_effect_gets_no_wrong_name(reported, case):
     """And what is true is never ruled out."""
-    result = told[case].result()
+    result = reported[case].result()
     assert min(result["D"].values()) >= CLEAR
     assert names(result) <= set(result["truth"]), words(result)
     assert result["probabilities"][case.causes[0]] > 0.01, words(result)
 
 
 @pytest.mark.slow
-def test_hidden_effects_are_named(told):
+def test_hidden_effects_are_named(reported):
     """All but one: tolerances that are wider than declared explain a record now and then, and that is said, too."""
-    results = [told[one.values[0]].result() for one in (*SINGLES, *LONG)]
+    results = [reported[one.values[0]].result() for one in (*SINGLES, *LONG)]
     missed = [words(one) for one in results if names(one) != set(one["truth"])]
     assert len(missed) <= 1, missed
 
 
 @pytest.mark.parametrize("case", slow("healthy", 0, 1, 2))
-def test_a_healthy_record_gets_no_name(told, case):
-    result = told[case].result()
+def test_a_healthy_record_gets_no_name(reported, case):
+    result = reported[case].result()
     assert not names(result), words(result)
 
 
 @pytest.mark.parametrize("case", slow("pair", 6))
-def test_two_hidden_effects_are_named(told, case):
-    result = told[case].result()
+def test_two_hidden_effects_are_named(reported, case):
+    result = reported[case].result()
     assert min(result["D"].values()) >= CLEAR
     assert names(result) == set(result["truth"]), words(result)
 
 
 @pytest.mark.parametrize("case", slow("sudden", 0, 4))
-def test_what_begins_in_mid_trial_is_named_with_its_time(told, case):
-    result = told[case].result()
+def test_what_begins_in_mid_trial_is_named_with_its_time(reported, case):
+    result = reported[case].result()
     assert min(result["D"].values()) >= CLEAR
     (cause,) = result["causes"] or ({"id": words(result), "start": 0.0},)
     assert cause["id"] == case.causes[0]
@@ -135,15 +135,15 @@ def test_what_begins_in_mid_trial_is_named_with_its_time(told, case):
 
 
 @pytest.mark.parametrize("case", slow("outside", 0, 3))
-def test_what_is_outside_the_catalogue_is_flagged(told, case):
-    result = told[case].result()
+def test_what_is_outside_the_catalogue_is_flagged(reported, case):
+    result = reported[case].result()
     assert result["verdict"] == "outside_catalogue", words(result)
 
 
 @pytest.mark.parametrize("case", slow("twin", 0))
-def test_twins_are_told_as_a_set(told, case):
+def test_twins_are_told_as_a_set(reported, case):
     """No name, and the truth among those that are left."""
-    result = told[case].result()
+    result = reported[case].result()
     assert max(result["D"].values()) < 4.0
     assert not names(result), words(result)
     assert any(set(one.split(" + ")) & set(result["truth"]) for one in result["probabilities"]), words(result)
@@ -151,16 +151,16 @@ def test_twins_are_told_as_a_set(told, case):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", [drawn("healthy", 3, how="wide")])
-def test_tolerances_declared_half_as_wide_make_no_false_name(told, case):
-    result = told[case].result()
+def test_tolerances_declared_half_as_wide_make_no_false_name(reported, case):
+    result = reported[case].result()
     assert not names(result), words(result)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("case", list(both_signs()))
-def test_every_effect_is_found_with_both_signs(told, case):
+def test_every_effect_is_found_with_both_signs(reported, case):
     """On the rich manoeuvre: no wrong name, and the right one first where D says that it can be told."""
-    result = told[case].result()
+    result = reported[case].result()
     assert names(result) <= set(case.causes), words(result)
     if min(result["D"].values()) >= 16.0:
         assert next(iter(result["probabilities"])) == case.causes[0], words(result)
@@ -174,11 +174,11 @@ def test_a_swell_has_its_history_beside_noise_of_its_own():
     case = next(one for one in cases(75) if one.index == 149)
     made, *_ = posed(case)
     verdict = subzero.diagnose(made.logged, seed=case.index)
-    told, force = verdict.unknown, made.strange.force
-    true = np.interp(told.time, force.time, np.array(force.wrench)[:, 0])
-    assert (verdict.verdict, told.axis) == ("outside_catalogue", "X"), verdict
-    assert np.sqrt(np.mean((told.force - true) ** 2)) < 1.5 * np.sqrt(np.mean(told.band**2))
-    assert told.force @ true == pytest.approx(true @ true, rel=0.15)
+    reported, force = verdict.unknown, made.strange.force
+    true = np.interp(reported.time, force.time, np.array(force.wrench)[:, 0])
+    assert (verdict.verdict, reported.axis) == ("outside_catalogue", "X"), verdict
+    assert np.sqrt(np.mean((reported.force - true) ** 2)) < 1.5 * np.sqrt(np.mean(reported.band**2))
+    assert reported.force @ true == pytest.approx(true @ true, rel=0.15)
     speed, level = (
         verdict.gain.held_out["surge_speed"],
         verdict.misfit[made.logged.name]["surge_speed"].noise_sd,

@@ -49,7 +49,7 @@ def test_a_clock_between_the_sizes_that_are_tried_is_seen_from_afar(scenario, la
     search.only_nothing()
     search.look()
     assert search.screen.best(1, 1, np.inf) == [("clock_offset",)]
-    search.fit_from_afar()
+    search.fit_large_effects()
     assert not search.is_poor()
     assert search.best().ids == ("clock_offset",)
 

@@ -17,26 +17,26 @@ import subzero
 from benchmarks.diagnosis import world
 from subzero.diagnosis import SPECS
 from subzero.diagnosis.inference import (
-    Behind,
+    CorrelationTimes,
     Linear,
     Noise,
     Observed,
     Problem,
-    TimesBeside,
-    Usual,
+    ResidualNoise,
+    SensorPrior,
+    correlation_times_of,
     estimate,
-    gain_of_own_noise,
+    gain_of_refitted_noise,
     log_evidence_of,
     log_marginal,
     log_odds_of_frozen,
     log_of_outlier,
     log_of_outliers,
     log_prior_of,
+    refit_noise,
     resolution_of,
     spikes,
     steps_of,
-    times_beside,
-    with_own_noise,
 )
 
 LEVEL = 0.3
@@ -86,7 +86,9 @@ def test_the_mean_of_slow_noise_scatters_as_its_covariance_says():
 def behind(random, time, noise, misfit=1.0):
     """Return noise on top of a misfit that six parameters explain, each within its tolerance."""
     J = np.column_stack([np.sin((k + 1) * time / 9.0 + k) for k in range(6)])
-    return Behind(residual=noise + J @ (misfit * random.standard_normal(6)), J=J, D=np.full(6, misfit**2))
+    return ResidualNoise(
+        residual=noise + J @ (misfit * random.standard_normal(6)), J=J, D=np.full(6, misfit**2)
+    )
 
 
 FAMILIES = {
@@ -106,7 +108,7 @@ def test_level_is_found_behind_what_parameters_explain(family):
     random, time, found = np.random.default_rng(3), np.arange(0.0, end, step), []
     for _ in range(RECORDS):
         noise = white * random.standard_normal(time.size) + slow(random, time, slow_sd, lasts)
-        found.append(estimate(time, behind(random, time, noise), Usual(LEVEL, 0.0, is_known=False)))
+        found.append(estimate(time, behind(random, time, noise), SensorPrior(LEVEL, 0.0, is_known=False)))
     assert_allclose(np.median([one.sd for one in found]), np.hypot(white, slow_sd), rtol=0.2)
     lasting = 2.0 * slow_sd**2 * lasts + white**2 * step
     unseen = 2.0 * (0.35 * LEVEL) ** 2  # of a slow part so small that nothing but its prior speaks of it
@@ -154,7 +156,7 @@ def test_no_noise_close_by_is_more_probable_than_what_is_found():
     def log_posterior(noise):
         return log_normal(one.residual, one.J * one.D @ one.J.T + dense(noise)) + log_prior(noise, LEVEL)
 
-    found = estimate(time, one, Usual(LEVEL, 0.0, False))
+    found = estimate(time, one, SensorPrior(LEVEL, 0.0, False))
     for what in ("white", "slow", "correlation_time"):
         for factor in (0.8, 1.25):
             other = dataclasses.replace(found, **{what: factor * getattr(found, what)})
@@ -183,10 +185,12 @@ def two_channels(seed):
 
 def test_what_parameters_cannot_do_as_another_channel_says_is_noise_of_a_channel():
     problem, linear, D, values, J = two_channels(5)
-    depth = with_own_noise(problem, linear, D).records[0].noise["depth"]
+    depth = refit_noise(problem, linear, D).records[0].noise["depth"]
     spec = SPECS["depth"].noise
     alone = estimate(
-        depth.time, Behind(residual=values["depth"], J=J["depth"][:, None], D=D), Usual(spec, 0.0, False)
+        depth.time,
+        ResidualNoise(residual=values["depth"], J=J["depth"][:, None], D=D),
+        SensorPrior(spec, 0.0, False),
     )
     assert alone.slow < 0.5 * spec, "behind its own parameter there is no wander"
     assert 0.7 * spec < depth.slow < 2.0 * spec, "a sine of 1.5 levels has 1.06 in the mean"
@@ -206,10 +210,10 @@ def test_the_gain_of_own_noise_is_that_of_dense_covariances():
             log_prior(each, SPECS[name].noise) for name, each in noise.items()
         )
 
-    found = with_own_noise(problem, linear, D)
+    found = refit_noise(problem, linear, D)
     gain = log_posterior(found) - log_posterior(problem)
     assert gain > 1.0
-    assert_allclose(gain_of_own_noise(problem, linear, D), gain, rtol=1e-6)
+    assert_allclose(gain_of_refitted_noise(problem, linear, D), gain, rtol=1e-6)
 
 
 def test_noise_that_is_looked_for_again_is_not_lost():
@@ -222,17 +226,17 @@ def test_noise_that_is_looked_for_again_is_not_lost():
     values = 0.3 * tails * random.standard_t(2.5, time.size)
     values += quick * slow(random, time, 1.0, times[0]) + lasting * slow(random, time, 1.0, times[1])
     left, usual = (
-        Behind(residual=LEVEL * values, J=np.zeros((time.size, 1)), D=np.ones(1)),
-        Usual(LEVEL, 0.0, False),
+        ResidualNoise(residual=LEVEL * values, J=np.zeros((time.size, 1)), D=np.ones(1)),
+        SensorPrior(LEVEL, 0.0, False),
     )
 
     def log_posterior(noise):
         return log_normal(left.residual, dense(noise)) + log_prior(noise, LEVEL)
 
-    begun = Noise(
+    started = Noise(
         white=0.1 * LEVEL, slow=0.3 * LEVEL, correlation_time=0.4, used=np.ones(300, bool), time=time
     )
-    known = estimate(time, left, usual, begun)
+    known = estimate(time, left, usual, started)
     assert log_posterior(known) > log_posterior(estimate(time, left, usual)) + 1.0
     assert log_posterior(estimate(time, left, usual, known)) > log_posterior(known) - 0.1
 
@@ -250,15 +254,15 @@ def test_the_slow_parts_of_other_channels_say_how_long_that_of_one_lasts():
     """
     time = np.arange(0.0, 30.0, 0.1)
     noise = wandering(time, 0.2, 0.15, 0.25, 4.0)
-    found = times_beside(noise)
+    found = correlation_times_of(noise)
     quick, odd = found["channel 0"], found["channel 3"]
     assert odd.median == pytest.approx(0.2)
     apart = np.sum(np.log(np.array([0.75, 1.25])) ** 2)
     assert odd.spread**2 == pytest.approx((2.0 * 0.9**2 + apart) / (2.0 + 3.0))
     assert quick.spread > 1.5 * odd.spread
-    assert times_beside(wandering(time, 0.2, 0.2)) == {}
+    assert correlation_times_of(wandering(time, 0.2, 0.2)) == {}
     none = dataclasses.replace(noise["channel 1"], slow=0.01)
-    hardly = times_beside({**noise, "channel 1": none})
+    hardly = correlation_times_of({**noise, "channel 1": none})
     assert hardly["channel 3"].freedom == odd.freedom - 1.0 == 4.0
     assert hardly["channel 1"] == found["channel 1"], "a channel is not beside itself"
 
@@ -266,7 +270,7 @@ def test_the_slow_parts_of_other_channels_say_how_long_that_of_one_lasts():
 def test_what_is_known_of_a_time_is_a_normal_distribution_whose_variance_is_not_known():
     """By quadrature over the variance v: 1/v has a gamma distribution of the degrees of freedom and the scale."""
     time, freedom, scale = np.arange(0.0, 30.0, 0.1), 5.0, 0.6
-    usual = Usual(LEVEL, 0.0, False, TimesBeside(0.2, scale, freedom))
+    usual = SensorPrior(LEVEL, 0.0, False, CorrelationTimes(0.2, scale, freedom))
     log_v = np.linspace(-8.0, 12.0, 20_001)
     v = np.exp(log_v)
     weight = v ** (-0.5 * freedom) * np.exp(-0.5 * freedom * scale**2 / v)
@@ -274,7 +278,7 @@ def test_what_is_known_of_a_time_is_a_normal_distribution_whose_variance_is_not_
     made = wandering(time, 0.2, 0.5, 4.0).values()
     density = [np.sum(weight * np.exp(-(np.log(one.correlation_time / 0.2) ** 2) / (2.0 * v)) / np.sqrt(v))
                for one in made]  # fmt: skip
-    alone = Usual(LEVEL, 0.0, False)
+    alone = SensorPrior(LEVEL, 0.0, False)
     for one, beside in zip(made, density, strict=True):
         normal = np.exp(-(np.log(one.correlation_time) ** 2) / (2.0 * 1.5**2)) / 1.5
         assert log_prior_of(one, usual) - log_prior_of(one, alone) == pytest.approx(np.log(beside / normal))
@@ -304,7 +308,7 @@ def test_the_evidence_of_some_samples_is_that_of_a_record_without_the_others():
     fewer = dataclasses.replace(problem, records=(dataclasses.replace(record, noise=noise),))
     white = [(one.whiten(values[name]), one.whiten(J[name])) for name, one in noise.items()]
     whole, slopes = (np.concatenate([pair[i] for pair in white]) for i in range(2))
-    own = with_own_noise(fewer, Linear(whole, slopes[:, None]), D).records[0].noise
+    own = refit_noise(fewer, Linear(whole, slopes[:, None]), D).records[0].noise
     both, moved = (np.concatenate([one[name][kept[name]] for name in own]) for one in (values, J))
     covariance = np.outer(moved, moved) * D[0]
     covariance += block_diag(*(dense(one) for one in own.values()))
@@ -337,7 +341,7 @@ def test_a_wander_of_twenty_levels_is_no_noise():
     found = estimate(
         time,
         behind(random, time, LEVEL * random.standard_normal(300) + wander, 1e-3),
-        Usual(LEVEL, 0.0, False),
+        SensorPrior(LEVEL, 0.0, False),
     )
     assert found.slow < 4.0 * LEVEL
     assert np.sum(found.whiten(wander) ** 2) > 100.0, "ten standard deviations of it still show"
@@ -346,7 +350,7 @@ def test_a_wander_of_twenty_levels_is_no_noise():
 def test_a_known_level_is_kept():
     random, time = np.random.default_rng(5), np.arange(0.0, 30.0, 0.1)
     noise = behind(random, time, LEVEL * random.standard_normal(300))
-    assert_allclose(estimate(time, noise, Usual(LEVEL, 0.0, is_known=True)).sd, LEVEL, rtol=0.1)
+    assert_allclose(estimate(time, noise, SensorPrior(LEVEL, 0.0, is_known=True)).sd, LEVEL, rtol=0.1)
 
 
 @pytest.mark.parametrize("step", [1.0, 0.05, 0.1, 1e-3])
@@ -428,7 +432,7 @@ def test_two_spikes_at_the_end_of_a_record_are_no_majority():
 @pytest.mark.parametrize("white, slow", [(0.5, 0.0), (1.0, 0.0), (0.5, 0.7), (0.2, 1.5)])
 def test_a_rounded_channel_that_stands_still_is_not_said_to_be_frozen(white, slow):
     """Where nothing froze, odds above e^5, which are the least to suspect it, come at most once in 150 records."""
-    usual, rng = Usual(level=0.2, resolution=0.5, is_known=False), np.random.default_rng(20263)
+    usual, rng = SensorPrior(level=0.2, resolution=0.5, is_known=False), np.random.default_rng(20263)
     for _ in range(8):
         shown, _ = standing(usual, white, slow, rng)
         repeats = np.arange(200) > np.flatnonzero(np.diff(shown, prepend=np.nan) != 0.0)[-1]
@@ -440,7 +444,7 @@ def test_a_rounded_channel_that_flickers_no_more_is_frozen_and_slow_noise_says_l
     """The last 100 of 200 samples are equal, a quarter of a noise level from the edge of their step: white noise would
     have left it some 40 times, and a slow part that lasts for 2 s may have stayed away from it.
     """
-    usual, at, odds = Usual(level=0.2, resolution=0.5, is_known=False), np.arange(200), []
+    usual, at, odds = SensorPrior(level=0.2, resolution=0.5, is_known=False), np.arange(200), []
     for white, slow in ((1.0, 0.0), (0.5, 0.7)):
         shown, true = standing(usual, white, slow, np.random.default_rng(20264), place=0.2)
         shown[100:] = shown[100]
@@ -450,7 +454,7 @@ def test_a_rounded_channel_that_flickers_no_more_is_frozen_and_slow_noise_says_l
 
 
 def standing(
-    usual: Usual, white: float, slow: float, rng: np.random.Generator, place: float | None = None
+    usual: SensorPrior, white: float, slow: float, rng: np.random.Generator, place: float | None = None
 ) -> tuple[np.ndarray, float]:
     """Return what a rounded sensor shows of what stands still (200,), with noise in usual levels, and where it does."""
     true = usual.resolution * (rng.uniform(-0.5, 0.5) if place is None else place)

@@ -89,9 +89,11 @@ def test_a_growing_heel_is_seen_as_a_term_where_a_free_force_is_not(planted):
     columns = {FORCE + a: C for a, C in force_columns(planted.problem, fit.z, ("K", "N"), knots).items()}
     scales, terms = {1.0: Scale(0.0, fit.D)}, one_terms(planted.problem, fit.z, knots)
     free = latent_force_candidates(planted.problem, columns, fit, scales, knots)
-    told = latent_force_candidates(planted.problem, columns, fit, scales, knots, terms)
-    assert told[0].id == "unknown_force:K"
-    assert told[0].log_gain > free[0].log_gain + 3.0, "one number in the place of a knot every two seconds"
+    reported = latent_force_candidates(planted.problem, columns, fit, scales, knots, terms)
+    assert reported[0].id == "unknown_force:K"
+    assert reported[0].log_gain > free[0].log_gain + 3.0, (
+        "one number in the place of a knot every two seconds"
+    )
 
 
 def test_two_records_have_terms_of_their_own(planted):
@@ -112,6 +114,6 @@ def test_a_swell_is_seen_as_a_wave_where_a_free_force_is_not(planted):
     push = 0.8 * np.sin(2.0 * np.pi * knots.time / 4.0 + 2.0)
     pushed = dataclasses.replace(fit, r=fit.r + C @ push)
     scales, terms = {1.0: Scale(0.0, fit.D)}, one_terms(problem, fit.z, knots)
-    free, told = (latent_force_candidates(problem, {FORCE + "X": C}, pushed, scales, knots, some)[0].log_gain
+    free, reported = (latent_force_candidates(problem, {FORCE + "X": C}, pushed, scales, knots, some)[0].log_gain
                   for some in (None, terms))  # fmt: skip
-    assert told > free + 3.0
+    assert reported > free + 3.0

@@ -35,14 +35,14 @@ def setting():
     return Setting(trial=trial, model=Model.of(trial))
 
 
-def begun(setting, name, time, *values):
+def started(setting, name, time, *values):
     return with_onset(all_effects()[name], time).apply(setting, *values)
 
 
 def test_a_jammed_rudder_stands_where_it_is_told_from_its_time_on():
     trial = subzero.load_scenario("zigzag")
     setting = Setting(trial=trial, model=Model.of(trial))
-    jammed = begun(setting, "rudder_jam", 12.0, 1.0, -3.0)
+    jammed = started(setting, "rudder_jam", 12.0, 1.0, -3.0)
     angle = respond(jammed, SAMPLES, ("rudder_angle",))["rudder_angle"]
     before = respond(setting, SAMPLES, ("rudder_angle",))["rudder_angle"]
     assert_allclose(angle[SAMPLES < 12.0], before[SAMPLES < 12.0], atol=1e-9)
@@ -52,7 +52,7 @@ def test_a_jammed_rudder_stands_where_it_is_told_from_its_time_on():
 
 def test_water_that_comes_in_weighs_as_much_as_has_come_in(setting):
     """Two newtons a minute from 6 s on: in each interval the model has the mean of what has come in by then."""
-    flooded = begun(setting, "flooding", 6.0, -2.0)
+    flooded = started(setting, "flooding", 6.0, -2.0)
     nominal = setting.model.vehicle.buoyancy.net_buoyancy
     times = np.array([time for time, _ in flooded.later])
     force = np.array([model.vehicle.buoyancy.net_buoyancy - nominal for _, model in flooded.later])
@@ -63,9 +63,9 @@ def test_water_that_comes_in_weighs_as_much_as_has_come_in(setting):
 
 def test_growth_in_steps_is_growth(setting, monkeypatch):
     """A run whose model changes every second is that whose model changes with every exchange, but for little."""
-    grown = begun(setting, "fading_thrust", 7.3, -0.8)
+    grown = started(setting, "fading_thrust", 7.3, -0.8)
     monkeypatch.setattr("subzero.diagnosis.hypothesis.effect.GROWTH_STEP_S", 0.1)
-    finely = begun(setting, "fading_thrust", 7.3, -0.8)
+    finely = started(setting, "fading_thrust", 7.3, -0.8)
     assert len(finely.later) > 2 * len(grown.later)
     shown, finer = (respond(one, SAMPLES, CHANNELS) for one in (grown, finely))
     for name in CHANNELS:
@@ -75,8 +75,8 @@ def test_growth_in_steps_is_growth(setting, monkeypatch):
 def test_growth_is_beside_what_else_begins_in_mid_trial(setting):
     """In either order: a rudder struck at 10 s, and weed from 5 s on."""
     drag = setting.model.vehicle.axial_drag.drag_coefficient
-    one = begun(begun(setting, "fouling", 5.0, 1.0), "rudder_offset", 10.0, 2.0)
-    other = begun(begun(setting, "rudder_offset", 10.0, 2.0), "fouling", 5.0, 1.0)
+    one = started(started(setting, "fouling", 5.0, 1.0), "rudder_offset", 10.0, 2.0)
+    other = started(started(setting, "rudder_offset", 10.0, 2.0), "fouling", 5.0, 1.0)
     for both in (one, other):
         last = both.later[-1][1].vehicle
         assert last.rudder_servo.offset == pytest.approx(np.radians(2.0))
@@ -137,10 +137,10 @@ def test_what_grows_is_a_sum_of_steps_in_the_scan():
     steps = [(thrust, time) for time in times_of(problem, 0)]
     columns = dict(zip(steps, change_point_columns(along, steps), strict=True))
     sums = grown([fading], columns, spacing)
-    early = [begun for begun in sums if begun[1] < 0.6 * flown.duration]
+    early = [started for started in sums if started[1] < 0.6 * flown.duration]
     assert len(early) > 5
-    for begun, runs in zip(early, change_point_columns(along, early), strict=True):
-        assert np.linalg.norm(sums[begun] - runs) < 0.1 * np.linalg.norm(runs)
+    for started, runs in zip(early, change_point_columns(along, early), strict=True):
+        assert np.linalg.norm(sums[started] - runs) < 0.1 * np.linalg.norm(runs)
 
 
 def fitted_change_point(name, log_posterior):
@@ -152,13 +152,13 @@ def fitted_change_point(name, log_posterior):
 @pytest.mark.parametrize(
     "ahead, told", [(0.0, ["rudder_offset"]), (1.0, ["rudder_offset"]), (5.0, ["rudder_jam"])]
 )
-def test_a_jam_that_is_not_needed_is_told_as_the_offset(ahead, told):
+def test_a_jam_that_is_not_needed_is_told_as_the_offset(ahead, reported):
     """Four times as probable (1.4 nats) is what it needs; the offset has the probability of both then."""
     both = [fitted_change_point("rudder_offset", -3.0), fitted_change_point("rudder_jam", ahead - 3.0)]
     kept = special_cases_folded(both)
-    assert [one.change_point.effect.id for one, _ in kept][-1:] == told
+    assert [one.change_point.effect.id for one, _ in kept][-1:] == reported
     total = np.logaddexp(-3.0, ahead - 3.0)
-    assert kept[0][1] == pytest.approx(total if told == ["rudder_offset"] else -3.0)
+    assert kept[0][1] == pytest.approx(total if reported == ["rudder_offset"] else -3.0)
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_it_is_named_for_what_it_is(name, values, trial):
     nominal = Setting(trial=flown, model=Model.of(flown))
     longer = replace(nominal, trial=replace(flown, duration=flown.duration + 1.0))
     times = np.arange(0.0, flown.duration + 1e-9, 0.1)
-    shown = simulate_reference(begun(longer, name, time, *values), times, CHANNELS)
+    shown = simulate_reference(started(longer, name, time, *values), times, CHANNELS)
     noisy = {
         channel: column + SPECS[channel].noise * rng.standard_normal(times.size)
         for channel, column in shown.items()

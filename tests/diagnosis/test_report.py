@@ -291,8 +291,8 @@ def test_what_is_told_of_nothing_is_the_probability_of_nothing():
         "That nothing is wrong: more likely than not (probability 0.600)."
         in answers(healthy)["How sure is that"]
     )
-    assert report.words.is_told("none", healthy)
-    assert not report.words.is_told("none", dataclasses.replace(healthy, verdict=UNDECIDED))
+    assert report.words.is_reported("none", healthy)
+    assert not report.words.is_reported("none", dataclasses.replace(healthy, verdict=UNDECIDED))
 
 
 def test_a_share_is_told_as_more_or_less_than_in_the_model():

@@ -17,7 +17,7 @@ from subzero.diagnosis.inference import DataError, Linear, Noise, Observed, Prob
 from subzero.diagnosis.inference.data_error_choice import compared
 from subzero.diagnosis.inference.data_error_evidence import Explained, Numbers
 from subzero.diagnosis.inference.data_error_scan import log_prior
-from subzero.diagnosis.inference.data_error_search import SuspectedError, Suspicion, suspected
+from subzero.diagnosis.inference.data_error_search import SuspectedError, Suspects, suspected
 from subzero.records.record import Record
 
 TIME = np.arange(0.0, 30.01, 0.1)
@@ -31,12 +31,12 @@ def smooth() -> Logged:
     return Logged(record=record, setting=Setting(trial=trial, model=subzero.Model.of(trial)), name="fig6")
 
 
-class Look:
+class DiagnosisSteps:
     """A search with a log evidence that is told; `helped` is what the causes of another search bring it to."""
 
     def __init__(self, plain: float, helped: float, put_right: float) -> None:
         self.plain, self.helped, self.put_right = plain, helped, put_right
-        self.entries, self.begun, self.finished = (), list[str](), list[str]()
+        self.entries, self.started, self.finished = (), list[str](), list[str]()
 
     def start(self, records):
         is_plain = records[0] is PLAIN
@@ -53,7 +53,7 @@ class Look:
                                name=name)  # fmt: skip
 
     def begin(self, work, is_hopeless):
-        self.begun.append(work.name)
+        self.started.append(work.name)
         work.given_up = is_hopeless()
 
     def finish(self, work):
@@ -77,9 +77,9 @@ def test_a_record_that_is_far_is_given_up_where_it_is_hopelessly_behind_what_was
 ):
     """Its first look, which takes long from afar, waits for the other, and tries what explains that."""
     step = SuspectedError(record=0, error=STEP, lead=100.0, generous=90.0, left=0.6)
-    look = Look(plain=-1000.0, helped=helped, put_right=0.0)
-    tried = compared(Suspicion(errors=(step,)), [PLAIN], look)
-    assert look.begun == ["as it is", "put right"]
+    look = DiagnosisSteps(plain=-1000.0, helped=helped, put_right=0.0)
+    tried = compared(Suspects(errors=(step,)), [PLAIN], look)
+    assert look.started == ["as it is", "put right"]
     assert set(look.finished) == ({"put right"} if is_given_up else {"put right", "as it is"})
     assert [one.work.given_up for one, _ in tried] == [False, is_given_up]
 
@@ -155,7 +155,7 @@ def lead_of_a_delay(outlier):
     values["heading"][10] = outlier  # at 1 s: outside the trial, if the heading is 3 s late
     logged = dataclasses.replace(PLAIN, record=Record(source="made", time=TIME, values=values))
     late = SuspectedError(record=0, error=LATE, lead=100.0, generous=90.0, left=0.6)
-    found = {len(one.errors): log for one, log in compared(Suspicion(errors=(late,)), [logged], Quiet())}
+    found = {len(one.errors): log for one, log in compared(Suspects(errors=(late,)), [logged], Quiet())}
     return found[1] - found[0]
 
 
@@ -167,7 +167,7 @@ def test_a_delay_of_nothing_but_noise_is_as_probable_as_beforehand(outlier):
     assert lead_of_a_delay(outlier) == pytest.approx(log_prior(LATE, 10), abs=1.0)
 
 
-class Interrupted(Look):
+class Interrupted(DiagnosisSteps):
     """A search that is interrupted when it has been started so often."""
 
     def __init__(self, *args, at: int) -> None:
@@ -190,8 +190,8 @@ def test_an_error_that_explains_nothing_gives_way_to_a_whole_search_without_it(m
     """That had been given up, as the set with the error seemed to explain more."""
     monkeypatch.setattr(data_error_choice, "numbers_again", step_explains_nothing)
     step = SuspectedError(record=0, error=STEP, lead=100.0, generous=90.0, left=0.6)
-    look = Look(plain=-1000.0, helped=-1000.0, put_right=0.0)
-    ((found, _),) = compared(Suspicion(errors=(step,)), [PLAIN], look)
+    look = DiagnosisSteps(plain=-1000.0, helped=-1000.0, put_right=0.0)
+    ((found, _),) = compared(Suspects(errors=(step,)), [PLAIN], look)
     assert not found.errors
     assert not found.work.given_up
     assert look.finished == ["put right", "as it is"]
@@ -201,7 +201,7 @@ def test_an_interrupt_of_that_search_keeps_what_was_found(monkeypatch):
     monkeypatch.setattr(data_error_choice, "numbers_again", step_explains_nothing)
     step = SuspectedError(record=0, error=STEP, lead=100.0, generous=90.0, left=0.6)
     look = Interrupted(-1000.0, -1000.0, 0.0, at=3)
-    tried = compared(Suspicion(errors=(step,)), [PLAIN], look)
+    tried = compared(Suspects(errors=(step,)), [PLAIN], look)
     assert {len(one.errors) for one, _ in tried} == {0, 1}
     assert not all(one.work.complete for one, _ in tried)
 

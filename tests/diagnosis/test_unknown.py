@@ -137,7 +137,7 @@ def one_bump(time, start, lasts):
     return np.sin(np.pi * np.clip((time - start) / lasts, 0.0, 1.0)) ** 2
 
 
-def told(change, seed, drift=None):
+def reported(change, seed, drift=None):
     """Return the verdict on fig6 with a change to it, tolerances drawn; one channel may drift, in its unit."""
     trial = subzero.load_scenario("fig6")
     setting = Setting(trial=trial, model=subzero.Model.of(trial))
@@ -155,7 +155,7 @@ def test_a_compass_that_wanders_by_many_levels_drifts_though_slow_noise_could_sa
     own, and a drift was only looked for beside the noise behind nothing.
     """
     size = 8.0 * SPECS["heading"].noise
-    found = told(lambda setting: setting, 14, {"heading": lambda time: size * one_bump(time, 3.0, 14.0)})
+    found = reported(lambda setting: setting, 14, {"heading": lambda time: size * one_bump(time, 3.0, 14.0)})
     assert found.verdict == "outside_catalogue"
     assert next(iter(found.probabilities)) == "sensor_drift:heading"
     assert found.unknown.axis == "heading"
@@ -178,7 +178,7 @@ def test_every_explanation_that_an_undecided_verdict_names_has_its_curve():
 
 def test_a_moment_that_heels_the_hull_for_some_seconds_is_no_noise_of_the_roll_angle():
     heel = pushed("K", lambda time: 0.02 * one_bump(time, 2.0, 16.0))
-    found = told(heel, 17)
+    found = reported(heel, 17)
     assert found.verdict == "outside_catalogue"
     assert next(iter(found.probabilities)) in ("unknown_force:K", "sensor_drift:roll_angle")
 
@@ -189,7 +189,7 @@ def test_a_compass_whose_noise_is_slow_does_not_drift():
     apart = np.abs(np.subtract.outer(SHORT, SHORT))
     half = np.linalg.cholesky(np.exp(-apart / 3.0) + 1e-12 * np.eye(SHORT.size))
     wander = SPECS["heading"].noise * half @ random.standard_normal(SHORT.size)
-    assert told(lambda setting: setting, 13, {"heading": lambda time: wander}).verdict == "nothing_wrong"
+    assert reported(lambda setting: setting, 13, {"heading": lambda time: wander}).verdict == "nothing_wrong"
 
 
 @pytest.mark.slow  # 50 s: every run of this vehicle is fitted from afar
@@ -207,4 +207,4 @@ def test_no_force_is_named_in_an_unstable_motion_that_no_run_follows():
 
 
 def test_a_motion_that_is_stable_is_not_called_unstable():
-    assert not told(lambda setting: setting, 19).unstable
+    assert not reported(lambda setting: setting, 19).unstable

@@ -122,16 +122,16 @@ def test_all_mistakes_of_a_vehicle_are_told_at_once(mapping):
     bad["ruder"] = bad.pop("rudder")
     with pytest.raises(vehicle.VehicleError) as caught:
         vehicle.from_mapping(bad)
-    told = {problem.key: problem for problem in caught.value.problems}
-    assert set(told) == {
+    reported = {problem.key: problem for problem in caught.value.problems}
+    assert set(reported) == {
         "rigid_body.mass", "hull.lenght", "hull.length", "propeller.diameter", "motor.lag", "ruder", "rudder",
     }  # fmt: skip
-    assert told["hull.lenght"].allowed == "did you mean 'length'"
-    assert told["ruder"].allowed == "did you mean 'rudder'"
-    assert told["rigid_body.mass"].allowed == "a number above 0 [kg]"
-    assert "not a number" in told["propeller.diameter"].why
-    assert told["motor.lag"].found == "nan"
-    assert "NaN is not a number" in told["motor.lag"].why
+    assert reported["hull.lenght"].allowed == "did you mean 'length'"
+    assert reported["ruder"].allowed == "did you mean 'rudder'"
+    assert reported["rigid_body.mass"].allowed == "a number above 0 [kg]"
+    assert "not a number" in reported["propeller.diameter"].why
+    assert reported["motor.lag"].found == "nan"
+    assert "NaN is not a number" in reported["motor.lag"].why
     assert str(caught.value).count("\n") == 6
 
 

@@ -104,9 +104,9 @@ def test_the_books_of_a_towed_cable_close(settings):
 def test_diagnostics_tell_how_a_run_was_solved():
     """√(T/m1) Δt/Δs of the fullest segment of a straight pull, by hand, at most a segment beside the tow point."""
     run = cable.pull_out(lambda _: (1.0, 0.0, 0.0), 20.0)
-    told = run.diagnostics()
-    assert told["steps"] == 200
-    assert told["closure_error_m"] < 1e-9
+    reported = run.diagnostics()
+    assert reported["steps"] == 200
+    assert reported["closure_error_m"] < 1e-9
     wave = np.sqrt(run.tow_tension[-1] / cable.CableProperties().virtual_mass_per_length)
-    assert told["largest_courant_number"] == pytest.approx(wave * 0.1 / 0.5, rel=0.02)
-    assert told["energy_residual"] < 1e-3
+    assert reported["largest_courant_number"] == pytest.approx(wave * 0.1 / 0.5, rel=0.02)
+    assert reported["energy_residual"] < 1e-3

@@ -56,17 +56,17 @@ def test_another_process_gives_the_same_bits():
         "import subzero, hashlib; run = subzero.simulate('fig6'); "
         "print(hashlib.sha256(run['cable_tension'].values.tobytes() + run['heading'].values.tobytes()).hexdigest())"
     )
-    told = subprocess.run(
+    reported = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True
     ).stdout.strip()
     here = subzero.simulate("fig6")
     mine = hashlib.sha256(here["cable_tension"].values.tobytes() + here["heading"].values.tobytes())
-    assert told == mine.hexdigest()
+    assert reported == mine.hexdigest()
 
 
 def test_progress_is_told_and_changes_nothing():
-    told = []
-    watched = subzero.simulate("fig6", progress=told.append)
+    reported = []
+    watched = subzero.simulate("fig6", progress=reported.append)
     assert fingerprint(watched) == fingerprint(subzero.simulate("fig6"))
-    assert told == sorted(told)
-    assert told[-1] == 1.0
+    assert reported == sorted(reported)
+    assert reported[-1] == 1.0

@@ -280,24 +280,24 @@ LATE = changed("current", duration=2.0, segment_length=1.0)
 
 def test_a_run_that_is_right_since_its_last_halving_is_not_doubted_but_proved():
     run = subzero.simulate(dataclasses.replace(LATE, rtol=0.005))
-    told = accuracy(run)
-    assert (told["halvings"], told["proof_finer"]) == (4, 4)
-    assert told["change"] > 0.005 > told["force_error"] > 0.0
+    reported = accuracy(run)
+    assert (reported["halvings"], reported["proof_finer"]) == (4, 4)
+    assert reported["change"] > 0.005 > reported["force_error"] > 0.0
     assert subzero.warnings_of(run) == ()
     fine = force(subzero.simulate(finer(LATE, 64)))[::64]
     errors = np.linalg.norm(force(run) - fine, axis=1)[1:] / np.linalg.norm(fine, axis=1).max()
-    assert told["proof_error"] == pytest.approx(
+    assert reported["proof_error"] == pytest.approx(
         errors.max(), rel=0.01
     )  # of the largest, rows between included
-    assert told["force_error"] >= told["proof_error"]
+    assert reported["force_error"] >= reported["proof_error"]
 
 
 def test_a_doubt_that_the_first_finer_run_shares_stays_and_says_by_how_much():
     run = subzero.simulate(dataclasses.replace(LATE, rtol=0.0005))
-    told, said = accuracy(run), dict(subzero.warnings_of(run))
-    assert told["proof_finer"] == 2
-    assert told["force_error"] == told["proof_error"] > 0.0005
-    share = f"{100.0 * told['proof_error']:.3g} %"
+    reported, said = accuracy(run), dict(subzero.warnings_of(run))
+    assert reported["proof_finer"] == 2
+    assert reported["force_error"] == reported["proof_error"] > 0.0005
+    share = f"{100.0 * reported['proof_error']:.3g} %"
     assert (
         f"2 times as fine as these (16 times as fine as given) they change it by {share}"
         in said["resolution"]
@@ -306,9 +306,9 @@ def test_a_doubt_that_the_first_finer_run_shares_stays_and_says_by_how_much():
 
 
 def test_a_start_that_finer_runs_contradict_is_not_held_against_them_again():
-    told = accuracy(subzero.simulate(dataclasses.replace(START_FROM_REST, rtol=1e-4)))
-    assert told["start_error"] > 1e-4
-    assert told["proof_finer"] == 0
+    reported = accuracy(subzero.simulate(dataclasses.replace(START_FROM_REST, rtol=1e-4)))
+    assert reported["start_error"] > 1e-4
+    assert reported["proof_finer"] == 0
 
 
 def test_a_finer_run_that_is_refused_proves_nothing():
@@ -397,10 +397,10 @@ START_FROM_REST = changed(
 def test_a_propeller_that_takes_hold_of_a_resting_cable_at_once_is_seen_in_the_first_sample():
     """No sample of the coarser run is there; what comes later is as right as can be."""
     run = subzero.simulate(dataclasses.replace(START_FROM_REST, rtol=0.2))
-    told, fine = accuracy(run), force(subzero.simulate(finer(START_FROM_REST, 8)))[::8]
+    reported, fine = accuracy(run), force(subzero.simulate(finer(START_FROM_REST, 8)))[::8]
     errors = np.linalg.norm(force(run) - fine, axis=1)[1:] / np.linalg.norm(fine, axis=1).max()
     assert errors.argmax() == 0
     assert errors.max() > 2.0 * errors[5:].max()
-    assert told["start_error"] == pytest.approx(errors[:5].max(), rel=0.3)
-    assert told["force_error"] >= told["start_error"]
-    assert told["start_time"] == pytest.approx(0.1)
+    assert reported["start_error"] == pytest.approx(errors[:5].max(), rel=0.3)
+    assert reported["force_error"] >= reported["start_error"]
+    assert reported["start_time"] == pytest.approx(0.1)

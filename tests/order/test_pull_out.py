@@ -90,8 +90,8 @@ def turning(rate, total, start=4.0, soft=2.0):
     """Return an angle that turns at a rate [rad/s] by `total` [rad], with soft ends of `soft` seconds."""
 
     def angle(t):
-        begun, ended = (t - start) / soft, (t - start - total / rate) / soft
-        return rate * soft * (ramp_integral(begun) - ramp_integral(ended))
+        started, ended = (t - start) / soft, (t - start - total / rate) / soft
+        return rate * soft * (ramp_integral(started) - ramp_integral(ended))
 
     return angle
 

@@ -172,8 +172,8 @@ def test_of_what_is_undecided_the_most_probable_model_is_replayed_as_it_was_fitt
     first = Rival(ids=("rudder_offset",), sentence="the rudder is off its centre", probability=0.7,
                   discrimination=math.nan, extended=Extended(deviations=OFF))  # fmt: skip
     bent = Extended(calibration={"rudder_lift_slope": {"share": 0.5}})
-    told = dataclasses.replace(verdict, verdict=UNDECIDED, causes=(), rivals=(first,), extended=bent)
-    (found, *_), said = replayed(told, logged, run)
+    reported = dataclasses.replace(verdict, verdict=UNDECIDED, causes=(), rivals=(first,), extended=bent)
+    (found, *_), said = replayed(reported, logged, run)
     (fitted, *_), _ = replayed(verdict, logged, run)
     assert found.name == "most probable model"
     assert "Solid: the most probable model." in said
@@ -188,9 +188,9 @@ def test_a_record_with_errors_in_its_data_is_replayed_as_it_is_once_they_are_put
     right = Curves(time=record.time, measured=record.values, models={}, used={})
     error = FoundError(id="sign:heading", record=logged.name, columns=("heading_deg",), sentence="heading_deg has the "
                        "other sign", remedy="change its sign", probability=1.0)  # fmt: skip
-    told = dataclasses.replace(verdict, verdict=DATA_ERROR, then=verdict.verdict, data_errors=(error,),
+    reported = dataclasses.replace(verdict, verdict=DATA_ERROR, then=verdict.verdict, data_errors=(error,),
                                curves={logged.name: right})  # fmt: skip
-    actors, said = replayed(told, dataclasses.replace(logged, record=wrong), run)
+    actors, said = replayed(reported, dataclasses.replace(logged, record=wrong), run)
     as_it_is, _ = replayed(verdict, logged, run)
     assert actors[2].name == as_it_is[2].name == "measured"
     assert "its errors put right" in said

@@ -117,9 +117,9 @@ def test_a_refused_value_is_told_beside_its_slider_in_the_words_of_the_file_read
     (tmp_path / "wrong.toml").write_text(text, encoding="utf-8")
     with pytest.raises(scenarios.ScenarioError) as refused:
         subzero.load_scenario(tmp_path / "wrong.toml")
-    told = "\n".join(answer.refusals.values())
+    reported = "\n".join(answer.refusals.values())
     for problem in refused.value.problems:
-        assert f"found {problem.found}, but {problem.why}. {problem.remedy}" in told
+        assert f"found {problem.found}, but {problem.why}. {problem.remedy}" in reported
 
 
 def test_numbers_are_set_beside_the_nominal_ones(short: Exploration) -> None:
@@ -211,13 +211,13 @@ class Worker:
         self.found: list[int] = []
         self.taken_up: list[int] = []
         self.errors: list[Exception] = []
-        self.begun, self.may_look, self.may_end, self.has_ended = (threading.Event() for _ in range(4))
+        self.started, self.may_look, self.may_end, self.has_ended = (threading.Event() for _ in range(4))
 
     def work(self, request: int, progress: Callable[[float], None]) -> int:
         if request < 0:
             raise ZeroDivisionError
         self.taken_up.append(request)
-        self.begun.set()
+        self.started.set()
         assert self.may_look.wait(5.0)
         while not self.may_end.wait(0.005):
             progress(0.5)
@@ -236,7 +236,7 @@ def test_the_newest_request_wins_and_old_ones_are_given_up() -> None:
     worker = Worker()
     newest = Newest(worker.work, worker.done)
     newest.ask(1)
-    assert worker.begun.wait(5.0)
+    assert worker.started.wait(5.0)
     for request in (2, 3, 4):
         newest.ask(request)
     worker.may_look.set()
@@ -301,8 +301,8 @@ def served(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     ) as process:
         try:
             assert process.stdout is not None
-            told = "".join(process.stdout.readline() for _ in range(3))
-            yield process, told.split('"')[3]
+            reported = "".join(process.stdout.readline() for _ in range(3))
+            yield process, reported.split('"')[3]
         finally:
             process.kill()
 

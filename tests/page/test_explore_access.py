@@ -285,12 +285,12 @@ def test_a_long_run_is_answered_by_its_first_seconds(short: Exploration) -> None
     from subzero.explore import exploration as explore
 
     def slow(trial: Any, progress: Any) -> Any:
-        def told(fraction: float) -> None:
+        def reported(fraction: float) -> None:
             if trial.duration == 5.0 and not trial.rtol:
                 time.sleep(0.4 * explore.ATTEMPT_S)
             progress(fraction)
 
-        return subzero.simulate(trial, progress=told)
+        return subzero.simulate(trial, progress=reported)
 
     one = replace(short, simulate=slow)
     rough, last = one.answers({"commands.propeller_rps": 31.0})

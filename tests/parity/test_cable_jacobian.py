@@ -184,5 +184,5 @@ def test_the_tow_force_answers_to_the_first_block_as_told(segments):
     """
     line, work = bent_line(segments, TURNING, 1)
     _, pulls = differences(line, work, backward_weights.py_func(0.1, 0.1))
-    told = line.ends.tow.by_block.copy()
-    assert_allclose(told, pulls[:, :4], rtol=0, atol=0.1 * np.abs(told).max())
+    reported = line.ends.tow.by_block.copy()
+    assert_allclose(reported, pulls[:, :4], rtol=0, atol=0.1 * np.abs(reported).max())

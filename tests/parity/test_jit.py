@@ -40,7 +40,7 @@ json.dump(
 """
 
 
-def told(**environment):
+def reported(**environment):
     """Return what a process of its own tells."""
     answer = subprocess.run(
         [sys.executable, "-c", SCRIPT],
@@ -53,7 +53,7 @@ def told(**environment):
 
 
 def test_compiled_and_interpreted_code_give_the_same_numbers():
-    compiled, interpreted = told(NUMBA_DISABLE_JIT="0"), told(NUMBA_DISABLE_JIT="1")
+    compiled, interpreted = reported(NUMBA_DISABLE_JIT="0"), reported(NUMBA_DISABLE_JIT="1")
     assert len(compiled["shape"]) > 3  # nodes have come in
     for name, values in compiled.items():
         assert_allclose(interpreted[name], values, rtol=0, atol=1e-11 * np.abs(values).max(), err_msg=name)

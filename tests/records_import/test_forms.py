@@ -286,9 +286,9 @@ def test_a_map_says_part_start_order_and_steps(tmp_path):
     assert_allclose(later.values["depth"], truth()[6][150:], atol=1e-4)
     hold(read(swapped(), **clock, sort=True))
     hold(read(NAMED["whole seconds"][0], every_s=0.1))
-    begun = read(READ["iso with summer time"], columns=["time_s"], start="2026-10-25T01:00:00Z")
-    assert_allclose(begun.values["depth"], truth()[6][100:], atol=1e-4)
-    assert begun.time[0] == 0.0
+    started = read(READ["iso with summer time"], columns=["time_s"], start="2026-10-25T01:00:00Z")
+    assert_allclose(started.values["depth"], truth()[6][100:], atol=1e-4)
+    assert started.time[0] == 0.0
     assert_allclose(read(text(cells()[20:]), **clock, start=0).time[0], 2.0)
 
 

@@ -62,9 +62,9 @@ def test_in_a_notebook_strange_words_are_text(history, comparison):
 
 
 def test_a_comparison_shows_the_numbers_of_its_summary(comparison):
-    told = comparison.summary()
+    reported = comparison.summary()
     for label in ("tethered", "untethered"):
-        assert f"{told[label]['peak_speed_m_s']:.4g} m/s" in repr(comparison)
+        assert f"{reported[label]['peak_speed_m_s']:.4g} m/s" in repr(comparison)
     assert re.search(r"cable length at end +0\.4\d+ m +0 m", repr(comparison))
 
 

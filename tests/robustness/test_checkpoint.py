@@ -90,13 +90,13 @@ def test_a_run_that_is_broken_off_at_any_file_ends_the_same(case, tmp_path, kill
 def test_what_is_finished_is_not_run_again(tmp_path, monkeypatch):
     checkpoint = Checkpoint(folder=tmp_path / "kept", minutes=60.0)
     plain = subzero.simulate("fig6", checkpoint=checkpoint)
-    assert checkpoint.stands_at() is not None
+    assert checkpoint.kept_until() is not None
     monkeypatch.setattr("subzero.simulation.run.run_rows", None)
     xr.testing.assert_identical(subzero.simulate("fig6", checkpoint=checkpoint), plain)
     (tmp_path / "kept" / "mine.txt").write_text("mine", encoding="utf-8")
     checkpoint.remove()
     assert [path.name for path in (tmp_path / "kept").iterdir()] == ["mine.txt"]
-    assert checkpoint.stands_at() is None
+    assert checkpoint.kept_until() is None
 
 
 @pytest.mark.parametrize("what", ["trial", "model", "later models", "version of subzero", "processor"])
@@ -197,8 +197,8 @@ def killed_and_resumed(folder, kills, longest, duration=900):
     rng, found = np.random.default_rng(5), 0
     for _ in range(kills):
         process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
-        begun, wait = time.monotonic(), rng.uniform(0.0, longest)
-        while time.monotonic() - begun < 60.0 and not list(folder.glob(f"mine/checkpoint/**/{STATE}")):
+        started, wait = time.monotonic(), rng.uniform(0.0, longest)
+        while time.monotonic() - started < 60.0 and not list(folder.glob(f"mine/checkpoint/**/{STATE}")):
             time.sleep(0.01)
         time.sleep(wait)
         process.send_signal(signal.SIGKILL)

@@ -106,11 +106,11 @@ def heeds(pid):
 @functools.cache
 def seconds(name, folder):
     """Return how long a command takes that nobody interrupts; None where the folder of its outputs is whole."""
-    begun = time.monotonic()
+    started = time.monotonic()
     command = started(SLOW_COMMANDS[name], folder)
     out, err = command.communicate()
     assert command.returncode == 0, (out, err)
-    return time.monotonic() - begun
+    return time.monotonic() - started
 
 
 @pytest.fixture(scope="module")

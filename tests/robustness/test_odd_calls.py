@@ -282,7 +282,7 @@ def test_right_values_of_every_kind_are_taken(tmp_path):
 
 
 def test_arguments_are_looked_at_in_microseconds():
-    begun = time.perf_counter()
+    started = time.perf_counter()
     for _ in range(1000):
         cable.Current.uniform((0.1, 0.0, 0.0))
-    assert time.perf_counter() - begun < 1.0
+    assert time.perf_counter() - started < 1.0

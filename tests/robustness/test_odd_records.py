@@ -46,7 +46,7 @@ def finite(value):
     return not isinstance(value, float) or math.isfinite(value)
 
 
-def told(number, folder, capsys, *options):
+def reported(number, folder, capsys, *options):
     """Diagnose an odd record; return its verdict, or "refused"."""
     record, out = odd_records.written(number, folder), folder / f"found{number}"
     with patience(HANGS_S):
@@ -67,13 +67,13 @@ def told(number, folder, capsys, *options):
 
 @pytest.mark.parametrize("number", [100, 102, 103, pytest.param(104, marks=pytest.mark.slow), 106, 131, 154])
 def test_an_odd_record_gets_a_verdict_or_a_message(number, tmp_path, capsys):
-    told(number, tmp_path, capsys, "--screen")
+    reported(number, tmp_path, capsys, "--screen")
 
 
 @pytest.mark.slow
 def test_a_thousand_odd_records_get_a_verdict_or_a_message(tmp_path, capsys):
     found = Counter(
-        told(number, tmp_path, capsys, *([] if number % 4 == 0 else ["--screen"]))
+        reported(number, tmp_path, capsys, *([] if number % 4 == 0 else ["--screen"]))
         for number in range(1000, 2000)
     )
     print(f"\nodd records: {dict(found)}")

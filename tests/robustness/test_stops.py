@@ -114,10 +114,10 @@ def bar(clock):
 def test_work_that_stands_still_is_told_once_in_one_line(bar, clock):
     bar(0.25)
     for clock[0] in (1.0, STANDSTILL_S - 0.1):
-        bar.look()
+        bar.check()
     assert bar.text.getvalue() == ""
     for clock[0] in (STANDSTILL_S, STANDSTILL_S + 1.0, 10.0 * STANDSTILL_S):
-        bar.look()
+        bar.check()
     assert bar.text.getvalue() == (
         "Simulating mine stands at 25 % and has not moved on for 20 s. What costs is the cable.\n"
     )
@@ -127,21 +127,21 @@ def test_work_that_moves_is_not_told_to_stand_still(bar, clock):
     for k in range(100):
         clock[0] = k * 0.9 * STANDSTILL_S
         bar(k / 100.0)
-        bar.look()
+        bar.check()
     assert "has not moved" not in bar.text.getvalue()
 
 
 def test_work_that_will_take_hours_is_told(bar, clock):
     clock[0] = STANDSTILL_S
     bar(STANDSTILL_S / (2.1 * LONG_S))
-    bar.look()
+    bar.check()
     assert "will take about 2.1 hours more at this rate. What costs" in bar.text.getvalue()
 
 
 def test_compiling_is_no_standing_still(bar, clock, monkeypatch):
     monkeypatch.setattr("subzero.cli.progress._compiling", lambda: True)
     for clock[0] in range(100):
-        bar.look()
+        bar.check()
     monkeypatch.undo()
     assert "has not moved" not in bar.text.getvalue()
 
@@ -150,9 +150,9 @@ def test_while_functions_are_compiled_their_number_grows_on_a_line_every_second(
     monkeypatch.setattr("subzero.cli.progress._compiling", lambda: True)
     for count in (1, 1, 12):
         monkeypatch.setattr("subzero.jit.machine_code._compiled", [count])
-        bar.look()
+        bar.check()
     monkeypatch.setattr("subzero.cli.progress._compiling", lambda: False)
-    bar.look()
+    bar.check()
     assert bar.text.getvalue() == " 1. 12 functions.\n"
 
 
@@ -160,15 +160,15 @@ def test_a_command_whose_run_stands_still_says_so_while_it_computes(tmp_path, mo
     """The thread looks while the calculation does not come back."""
     from threading import Event
 
-    told = Event()
+    reported = Event()
 
     def stuck(*_args, progress, **_more):
         progress(0.5)
-        assert told.wait(60.0), "nobody told it"
+        assert reported.wait(60.0), "nobody told it"
         raise subzero.UserError("Enough.")
 
-    tell = ProgressBar._tell
-    monkeypatch.setattr(ProgressBar, "_tell", lambda self, *words: (tell(self, *words), told.set()))
+    tell = ProgressBar._notify
+    monkeypatch.setattr(ProgressBar, "_notify", lambda self, *words: (tell(self, *words), reported.set()))
     monkeypatch.setattr("subzero.cli.progress.STANDSTILL_S", 0.05)
     monkeypatch.setattr("subzero.cli.progress.LOOK_S", 0.01)
     monkeypatch.setattr("subzero.simulation.run.simulate", stuck)

@@ -154,14 +154,14 @@ def test_water_that_moves_east_only_near_the_surface_bends_the_upper_cable_east(
 def test_a_winch_that_is_too_slow_is_told_in_its_own_words(trial_of):
     run = subzero.simulate(trial_of(speed=1.0, wet=5.0, winch=winch("pay_out_rate", (0.0, 1.1), (20.0, 0.0))))
     assert run.attrs["outcome"] == "stopped"
-    told = re.fullmatch(
+    reported = re.fullmatch(
         r"The cable is too short beyond t = 3\.6 s: the winch has paid out ([0-9.]+) m, "
         r"the vehicle is ([0-9.]+) m away\. Try control = \"constant_tension\", or a higher pay_out_rate_m_s\.",
         run.attrs["outcome_message"],
     )
-    assert told, run.attrs["outcome_message"]
+    assert reported, run.attrs["outcome_message"]
     # 5 + 1.1 t − 0.0275 t² = 5 + t  at  t = 3.636 s; the last step tried ends near it
-    assert [float(number) for number in told.groups()] == pytest.approx([8.636, 8.636], abs=2e-3)
+    assert [float(number) for number in reported.groups()] == pytest.approx([8.636, 8.636], abs=2e-3)
 
 
 def test_the_courant_number_of_a_straight_pull_is_that_of_its_first_segment(trial_of, simulate):

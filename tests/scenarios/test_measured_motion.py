@@ -230,13 +230,13 @@ def test_a_record_that_cannot_be_followed_is_told_with_its_line(mistake, complai
 
 
 def test_a_linear_motion_refuses_what_it_would_not_follow(complaints):
-    (told,) = complaints(HEAD + FROM_FILE + 'interpolation = "linear"\n', table(log()))
-    assert told == (
+    (reported,) = complaints(HEAD + FROM_FILE + 'interpolation = "linear"\n', table(log()))
+    assert reported == (
         "log.csv, interpolation: a linear motion has speed, pitch and heading alone, and here is sway_speed too. "
         'Leave out the others, or take "smooth".'
     )
-    (told,) = complaints(HEAD + FROM_FILE + 'interpolation = "cubic"\n', table(log()))
-    assert told == (
+    (reported,) = complaints(HEAD + FROM_FILE + 'interpolation = "cubic"\n', table(log()))
+    assert reported == (
         "mine.toml, line 7, motion.interpolation: found 'cubic', but a motion is not interpolated so. "
         "Allowed: linear, smooth."
     )
@@ -263,8 +263,10 @@ def test_a_start_in_trim_refuses_what_it_finds_itself_and_needs_a_speed(complain
         f"mine.toml, line 7, start.propeller_speed_rps: found 20.0, {found}",
         f"mine.toml, line 8, start.pitch_deg: found 1.0, {found}",
     ]
-    (told,) = complaints(HEAD + "[start]\nat_trim = 1\n" + HELD)
-    assert told.startswith("mine.toml, line 6, start.at_trim: found 1, but this is neither true nor false.")
+    (reported,) = complaints(HEAD + "[start]\nat_trim = 1\n" + HELD)
+    assert reported.startswith(
+        "mine.toml, line 6, start.at_trim: found 1, but this is neither true nor false."
+    )
 
 
 def test_a_motion_made_in_python_is_checked_like_one_of_a_file():

@@ -88,10 +88,10 @@ def test_the_drum_carries_what_hangs_below_it(run):
 
 
 def test_the_record_says_what_winch_vessel_and_water_did(trial, run):
-    told = json.loads(run.attrs["parameters"])
-    assert told["winch"]["control"] == "pay_out_rate"
-    assert told["vessel"]["time"] == list(trial.vessel.time)
-    assert told["profile"]["depth"] == [0.0, 20.0, 60.0]
+    reported = json.loads(run.attrs["parameters"])
+    assert reported["winch"]["control"] == "pay_out_rate"
+    assert reported["vessel"]["time"] == list(trial.vessel.time)
+    assert reported["profile"]["depth"] == [0.0, 20.0, 60.0]
 
 
 @pytest.mark.slow

@@ -110,14 +110,14 @@ def test_one_line_and_a_plan_give_the_same_members_and_neither_takes_what_is_not
     plan = plan_sweep("fig6", lengths, changes=SHORT, tethered=False)
     one_line = subzero.sweep("fig6", lengths, changes=SHORT, tethered=False, workers=Here())
     assert one_line.identical(subzero.sweep(plan, workers=Here()))
-    for told, arguments, options in (
+    for reported, arguments, options in (
         ("Did you mean 'changes'?", ("fig6", lengths), {"change": SHORT}),
         ("no parameters are given", ("fig6",), {}),
         ("a plan has its parameters already", (plan, lengths), {}),
         ("a plan has its parameters already", (plan,), {"changes": SHORT}),
         ("both given", (plan,), {"workers": 2, "client": Here()}),
     ):
-        with pytest.raises(subzero.UserError, match=re.escape(told)):
+        with pytest.raises(subzero.UserError, match=re.escape(reported)):
             subzero.sweep(*arguments, **options)
 
 
@@ -511,9 +511,9 @@ def test_the_page_tells_what_failed_and_what_matters_and_shows_texts_of_users_as
 def test_a_file_with_a_mistake_is_answered_with_what_to_do(line, instead, said, tmp_path, capsys):
     (tmp_path / "mine.toml").write_text(SPEC.replace(line, instead), encoding="utf-8")
     assert main(["sweep", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "out")]) == 2
-    told = capsys.readouterr().err
-    assert said in told
-    assert "mine.toml" in told
+    reported = capsys.readouterr().err
+    assert said in reported
+    assert "mine.toml" in reported
     assert not (tmp_path / "out").exists()
 
 

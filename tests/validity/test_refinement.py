@@ -108,9 +108,9 @@ def mine(tmp_path):
 def test_check_on_the_command_line_tells_table_and_warning_everywhere_and_strict_exits_with_3(mine, capsys):
     words = ["compare", str(mine / "coarse.toml"), "--check", "--strict", "--out", str(mine / "out")]
     assert main(words) == STOPPED
-    told = capsys.readouterr()
-    said = " ".join(told.out.split())
-    assert "Warnings under --strict: " in told.err
+    reported = capsys.readouterr()
+    said = " ".join(reported.out.split())
+    assert "Warnings under --strict: " in reported.err
     for label in ("tethered", "untethered"):
         assert f"Change of the {label} run by half the steps and segments" in said
     summary = json.loads((mine / "out" / "summary.json").read_text(encoding="utf-8"))["tethered"]

@@ -247,14 +247,14 @@ def test_a_drum_whose_force_finer_runs_contradict_is_warned_of_with_by_how_much(
 
 def test_slack_is_not_doubted_if_a_run_four_times_as_fine_confirms_the_force():
     """3 % of the cable for 1.2 s; of 6 % the shape is nothing, whatever the force, and that is said without doubt."""
-    for share, finer, doubted, told in (
+    for share, finer, doubted, reported in (
         (0.03, 2, True, False), (0.03, 4, False, False), (0.06, 2, True, False), (0.06, 4, False, True),
     ):  # fmt: skip
         numbers = {"force_error": 0.003, "rtol": 0.02, "proof_finer": finer}
         run = folded(plain().assign_attrs(accuracy=json.dumps(numbers)), share, 1.2)
         assert bool(checked(run, check="slack")) is doubted, (share, finer)
         said = checked(run, check="slack_shape")
-        assert bool(said) is told, (share, finer)
+        assert bool(said) is reported, (share, finer)
     assert said[0].startswith(
         "Up to 6 % of the cable that is paid out is slack (at 20.5 s; first at 20 s, 1.1 s at a stretch)"
     )
@@ -275,8 +275,14 @@ def test_what_finer_runs_could_settle_is_not_asked_of_a_run_that_stopped():
 @pytest.mark.parametrize("estimated, proved, finer", [(0.014, 0, 0), (0.016, 0, 4), (0.016, 4, 0)])
 def test_an_error_that_is_estimated_close_to_what_is_allowed_is_found_instead(estimated, proved, finer):
     """2 % is allowed: an estimate is good to a third, and what finer runs have found is none."""
-    told = {"force_error": estimated, "rtol": 0.02, "proof_finer": proved, "start_error": 0.0, "halvings": 0}
-    run = plain().assign_attrs(accuracy=json.dumps(told), warnings="[]")
+    reported = {
+        "force_error": estimated,
+        "rtol": 0.02,
+        "proof_finer": proved,
+        "start_error": 0.0,
+        "halvings": 0,
+    }
+    run = plain().assign_attrs(accuracy=json.dumps(reported), warnings="[]")
     assert refinement_that_settles(run, FIG6, subzero.Model.of(FIG6)) == finer
 
 

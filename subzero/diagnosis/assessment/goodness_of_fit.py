@@ -170,7 +170,7 @@ def gain(
     rows = rows_of(problem)
     parts = parts_of(problem, rows)
     nominal = whitened_again(tolerance.problem, problem, nominal)
-    models = [_made_white(each, problem) for each in (tolerance, extended, rival or tolerance)]
+    models = [_whitened_anew(each, problem) for each in (tolerance, extended, rival or tolerance)]
     fitted = [nominal, *(model.fit.r for model in models)]
     held = [nominal, *(held_out(model, parts) for model in models)]
     n, t, e = (held[i] ** 2 for i in range(3))
@@ -184,7 +184,7 @@ def gain(
     )
 
 
-def _made_white(model: Fitted, problem: Problem) -> Fitted:
+def _whitened_anew(model: Fitted, problem: Problem) -> Fitted:
     """Return a fit of the same samples, white by the noise of another problem."""
     known = replace(model.problem, records=problem.records)
     return Fitted(known, rewhitened(model.fit, model.problem, known))

@@ -33,7 +33,7 @@ from subzero.diagnosis.assessment.trial_library import (
 from subzero.diagnosis.hypothesis.catalogue import START
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
 from subzero.diagnosis.hypothesis.hypotheses import entries_of
-from subzero.diagnosis.hypothesis.noise import Usual, usual_noise
+from subzero.diagnosis.hypothesis.noise import SensorPrior, prior_noise
 from subzero.diagnosis.inference.linear_gaussian import posterior
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import economical
@@ -92,7 +92,9 @@ def prepared_trial(problem: Problem, setting: Setting, channels: Sequence[str] =
     time = np.arange(step, setting.trial.duration + 1e-9, step)
     used = np.ones(time.size, bool)
     noise = {name: replace(each, used=used, time=time) for name, each in first.noise.items()}
-    noise |= {name: usual_noise(time, used, Usual(NOISE[name], 0.0, is_known=False)) for name in channels}
+    noise |= {
+        name: prior_noise(time, used, SensorPrior(NOISE[name], 0.0, is_known=False)) for name in channels
+    }
     seen = Observed(
         name="to come",
         time=time,
@@ -224,13 +226,13 @@ def next_trial(
     plans = [
         Plan(name=name, sentence=words, setting=make(setting)) for name, (words, make) in LIBRARY.items()
     ]
-    found = _looked_at(problem, plans, held)
+    found = _evaluated(problem, plans, held)
     if _most(found) < AMPLE_DISCRIMINATION:
         found += _with_channels(problem, setting, held)
     if _most(found) < DECISIVE_DISCRIMINATION:
-        found += _looked_at(problem, _drawn(setting, len(held), seed), held, most=2)
+        found += _evaluated(problem, _drawn(setting, len(held), seed), held, most=2)
     best = max(found, key=lambda plan: min(plan.discrimination, AMPLE_DISCRIMINATION), default=None)
-    return None if best is None else _told(best, _weights(probabilities, len(held)), seed)
+    return None if best is None else _reported(best, _weights(probabilities, len(held)), seed)
 
 
 def outlooks(problem: Problem, survivors: Sequence[Survivor]) -> list[tuple[str, Outlook]]:
@@ -255,7 +257,7 @@ def _weights(probabilities: Sequence[float] | None, count: int) -> np.ndarray:
     return weights / weights.sum()
 
 
-def _told(plan: Plan, prior: np.ndarray, seed: int) -> NextTrial:
+def _reported(plan: Plan, prior: np.ndarray, seed: int) -> NextTrial:
     """Return a plan as it is reported."""
     assert plan.view is not None
     return NextTrial(
@@ -268,7 +270,7 @@ def _told(plan: Plan, prior: np.ndarray, seed: int) -> NextTrial:
     )
 
 
-def _looked_at(
+def _evaluated(
     problem: Problem, plans: Sequence[Plan], held: Sequence[Belief], most: int = MAX_SIMULATED
 ) -> list[Plan]:
     """Return the most promising plans that are safe, in their order, up to the first that decides for sure."""

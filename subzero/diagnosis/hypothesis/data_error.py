@@ -30,7 +30,7 @@ import scenarios
 from scenarios.heading import TURN, continuous, turned
 from subzero.channels import BY_NAME, HEADING
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.hypothesis.noise import usual_of
+from subzero.diagnosis.hypothesis.noise import sensor_prior
 from subzero.errors import UserError
 from subzero.records.consistency import MISTAKEN, REPORTED_COMMANDS
 from subzero.records.record import Record
@@ -256,7 +256,9 @@ def _inside(logged: Logged, time: np.ndarray) -> Logged:
 def _steps(logged: Logged, channels: Iterable[str]) -> dict[str, float]:
     """Return channel → step between its values, of all that there are: samples are to be put outside the trial."""
     values = logged.record.values
-    shown = {name: usual_of(name, values[name], logged.noise, logged.steps).resolution for name in channels}
+    shown = {
+        name: sensor_prior(name, values[name], logged.noise, logged.steps).resolution for name in channels
+    }
     return {**logged.steps, **shown}
 
 

@@ -210,7 +210,7 @@ WHITE_SPREAD, SLOW_SPREAD, SLOW_SPREAD_ABOVE, TIME_SPREAD = 1.5, 1.0, 0.5, 1.5
 may wander by far less than is usual, but what wanders by far more is something to find. [-]"""
 USUAL_TIME = 1.0
 """Usual correlation time of a sensor's slow part. [s]"""
-TIME_SPREAD_BESIDE, SPREAD_WEIGHT, FEWEST_BESIDE, SEEN_SLOW = 0.9, 2, 2, 0.3
+TIME_SPREAD_OF_OTHERS, SPREAD_WEIGHT, FEWEST_CHANNELS, SEEN_SLOW = 0.9, 2, 2, 0.3
 """Standard deviation of log τ_s about the median of other channels before it is seen, how many channels that counts as,
 and where it holds: so many others have a slow part of at least this share of σ_w. One logger, and often one filter, has
 made them; how much alike they are is seen, too. [-]"""
@@ -228,7 +228,7 @@ SAME, STEPS_TRIED = 1e-6, 3
 makes one or two steps smaller than that of the sensor: so many are tried."""
 
 
-class TimesBeside(NamedTuple):
+class CorrelationTimes(NamedTuple):
     """Correlation times of the noise of the channels beside one: their median [s], the scale of a logarithm about its
     own [-], and the degrees of freedom that the scale is known with.
     """
@@ -238,7 +238,7 @@ class TimesBeside(NamedTuple):
     freedom: float
 
 
-class Usual(NamedTuple):
+class SensorPrior(NamedTuple):
     """What a sensor is like: level ν and resolution q, in the channel's unit, whether the level is known, and the
     correlation times that sensors beside it have, None if too few are known.
     """
@@ -246,7 +246,7 @@ class Usual(NamedTuple):
     level: float
     resolution: float
     is_known: bool
-    times_beside: TimesBeside | None = None
+    correlation_times_of: CorrelationTimes | None = None
 
 
 NOT_KNOWN: Mapping[str, float] = MappingProxyType({})
@@ -258,18 +258,18 @@ def level_of(channel: str, known: Mapping[str, float]) -> float:
     return known.get(channel, SPECS[channel].noise)
 
 
-def usual_of(
+def sensor_prior(
     channel: str, values: np.ndarray, known: Mapping[str, float], steps: Mapping[str, float] = NOT_KNOWN
-) -> Usual:
+) -> SensorPrior:
     """Return what a channel's sensor is like, before anything is fitted: its level as known or usual, its resolution as
     its values (n,) show it, or as more of them have shown: channel → step.
     """
     level = level_of(channel, known)
     step = steps[channel] if channel in steps else resolution_of(values, level)
-    return Usual(level, step, channel in known)
+    return SensorPrior(level, step, channel in known)
 
 
-def usual_noise(time: np.ndarray, used: np.ndarray, usual: Usual) -> Noise:
+def prior_noise(time: np.ndarray, used: np.ndarray, usual: SensorPrior) -> Noise:
     """Return the noise of a usual sensor, before anything is fitted.
 
     Args:
@@ -364,17 +364,17 @@ def _are_multiples(steps: np.ndarray, step: float, near: float, most: float) -> 
     return True
 
 
-def slow_usual(usual: Usual) -> float:
+def slow_usual(usual: SensorPrior) -> float:
     """Return σ_s of a usual sensor, with what rounding leaves."""
     return SLOW_SHARE * usual.level + usual.resolution / np.sqrt(12.0)
 
 
-def log_prior_of(noise: Noise, usual: Usual) -> float:
+def log_prior_of(noise: Noise, usual: SensorPrior) -> float:
     """Return the log density of a noise before the data speak, but for a constant of all noises."""
     return log_density(np.log([noise.white, noise.slow, noise.correlation_time]), prior_of(usual))
 
 
-def times_beside(noise: Mapping[str, Noise]) -> dict[str, TimesBeside]:
+def correlation_times_of(noise: Mapping[str, Noise]) -> dict[str, CorrelationTimes]:
     """Return what the correlation times beside each channel are like; without those beside which too few others have a
     slow part.
     """
@@ -384,14 +384,14 @@ def times_beside(noise: Mapping[str, Noise]) -> dict[str, TimesBeside]:
         if each.slow**2 >= SEEN_SLOW**2 * each.unrelated
     }
     others = {name: np.log([time for other, time in slow.items() if other != name]) for name in noise}
-    return {name: _about_their_median(logs) for name, logs in others.items() if logs.size >= FEWEST_BESIDE}
+    return {name: _about_their_median(logs) for name, logs in others.items() if logs.size >= FEWEST_CHANNELS}
 
 
-def _about_their_median(logs: np.ndarray) -> TimesBeside:
+def _about_their_median(logs: np.ndarray) -> CorrelationTimes:
     """Return what logarithms of correlation times (n,) say of a further one."""
     median, freedom = float(np.median(logs)), SPREAD_WEIGHT + logs.size
-    variance = (SPREAD_WEIGHT * TIME_SPREAD_BESIDE**2 + float(np.sum((logs - median) ** 2))) / freedom
-    return TimesBeside(float(np.exp(median)), float(np.sqrt(variance)), float(freedom))
+    variance = (SPREAD_WEIGHT * TIME_SPREAD_OF_OTHERS**2 + float(np.sum((logs - median) ** 2))) / freedom
+    return CorrelationTimes(float(np.exp(median)), float(np.sqrt(variance)), float(freedom))
 
 
 class Prior(NamedTuple):
@@ -408,9 +408,9 @@ class Prior(NamedTuple):
     most: float
 
 
-def prior_of(usual: Usual) -> Prior:
+def prior_of(usual: SensorPrior) -> Prior:
     """Return what is known of a usual sensor's noise beforehand."""
-    time, spread, freedom = usual.times_beside or (USUAL_TIME, TIME_SPREAD, np.inf)
+    time, spread, freedom = usual.correlation_times_of or (USUAL_TIME, TIME_SPREAD, np.inf)
     mean = np.log([usual.level, slow_usual(usual), time])
     below, above = (np.array([WHITE_SPREAD, each, spread]) for each in (SLOW_SPREAD, SLOW_SPREAD_ABOVE))
     level = float(mean[0]) if usual.is_known else np.nan

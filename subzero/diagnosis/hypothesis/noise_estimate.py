@@ -22,11 +22,11 @@ from subzero.diagnosis.hypothesis.noise import (
     FEWEST,
     Noise,
     Prior,
-    Usual,
+    SensorPrior,
     log_density,
+    prior_noise,
     prior_of,
     slow_usual,
-    usual_noise,
 )
 from subzero.jit import compiled, scratch
 
@@ -51,7 +51,7 @@ for so often."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Behind:
+class ResidualNoise:
     """What a fit leaves of a channel, for its noise to be found in.
 
     Attributes:
@@ -65,7 +65,7 @@ class Behind:
     D: np.ndarray
 
 
-class Sought(NamedTuple):
+class NoiseSearch(NamedTuple):
     """What the most probable noise is sought in.
 
     Attributes:
@@ -86,7 +86,9 @@ class Sought(NamedTuple):
     room: np.ndarray
 
 
-def estimate(time: np.ndarray, behind: Behind, usual: Usual, known: Noise | None = None) -> Noise:
+def estimate(
+    time: np.ndarray, behind: ResidualNoise, usual: SensorPrior, known: Noise | None = None
+) -> Noise:
     """Return the most probable noise of a channel behind a fit.
 
     Args:
@@ -99,35 +101,37 @@ def estimate(time: np.ndarray, behind: Behind, usual: Usual, known: Noise | None
         noise of which all these samples are used.
     """
     if time.size < FEWEST:
-        return usual_noise(time, np.ones(time.size, dtype=bool), usual)
+        return prior_noise(time, np.ones(time.size, dtype=bool), usual)
     r, F = behind.residual, _felt_directions(behind.J * np.sqrt(behind.D), usual.level)
     steps, both = np.diff(time, append=time[-1:]), np.column_stack([F, r])
     room = np.empty((both.shape[1] + 2, both.shape[1]))
-    sought = Sought(steps, both, usual.resolution**2 / 12.0, prior_of(usual), *_bounds(time, r, usual), room)
+    sought = NoiseSearch(
+        steps, both, usual.resolution**2 / 12.0, prior_of(usual), *_bounds(time, r, usual), room
+    )
     starts = _starts(time, r, F, usual)
     if known is not None:
         there = np.log([known.white, known.slow, known.correlation_time])
         starts = np.vstack([starts, np.clip(there, sought.low, sought.high)])
     costs = np.empty(len(starts))
     costs_of(sought, starts, costs)
-    begun = {
+    started = {
         *np.argsort(costs, kind="stable")[:BEGUN].tolist(),
         *([] if known is None else [len(starts) - 1]),
     }
-    for i in begun:
+    for i in started:
         costs[i] = descend(sought, starts[i])
-    return _noise_of(starts[min(begun, key=lambda i: costs[i])], time, usual)
+    return _noise_of(starts[min(started, key=lambda i: costs[i])], time, usual)
 
 
 @compiled
-def costs_of(sought: Sought, points: np.ndarray, costs: np.ndarray) -> None:
+def costs_of(sought: NoiseSearch, points: np.ndarray, costs: np.ndarray) -> None:
     """Fill the cost of each point (n, 3)."""
     for i in range(costs.size):
         costs[i] = _cost(sought, points[i])
 
 
 @compiled
-def _cost(sought: Sought, log: np.ndarray) -> float:
+def _cost(sought: NoiseSearch, log: np.ndarray) -> float:
     """Return minus the log density of log σ_w, log σ_s, log τ_s (3,), but for a constant."""
     white, slow, lasts = np.exp(log[0]), np.exp(log[1]), np.exp(log[2])
     unrelated = white * white + sought.rounding
@@ -136,7 +140,7 @@ def _cost(sought: Sought, log: np.ndarray) -> float:
 
 
 @compiled
-def descend(sought: Sought, point: np.ndarray) -> float:
+def descend(sought: NoiseSearch, point: np.ndarray) -> float:
     """Overwrite a point (3,) with the best one down from it, and return the cost of that."""
     simplex, costs = scratch(4, 3), scratch(1, 4)[0]
     for k in range(4):
@@ -153,7 +157,7 @@ def descend(sought: Sought, point: np.ndarray) -> float:
 
 
 @compiled
-def _corner(sought: Sought, point: np.ndarray, moved: int, corner: np.ndarray) -> None:
+def _corner(sought: NoiseSearch, point: np.ndarray, moved: int, corner: np.ndarray) -> None:
     """Fill a corner of the first simplex (3,): the point with one of its numbers moved, back from a bound."""
     for i in range(3):
         corner[i] = point[i]
@@ -165,7 +169,7 @@ def _corner(sought: Sought, point: np.ndarray, moved: int, corner: np.ndarray) -
 
 
 @compiled
-def _clip(sought: Sought, point: np.ndarray) -> None:
+def _clip(sought: NoiseSearch, point: np.ndarray) -> None:
     """Put a point (3,) between the bounds."""
     for i in range(3):
         point[i] = min(max(point[i], sought.low[i]), sought.high[i])
@@ -194,7 +198,7 @@ def _is_settled(simplex: np.ndarray, costs: np.ndarray) -> bool:
 
 
 @compiled
-def _improve(sought: Sought, simplex: np.ndarray, costs: np.ndarray) -> int:
+def _improve(sought: NoiseSearch, simplex: np.ndarray, costs: np.ndarray) -> int:
     """Put a better point in the place of the worst corner, or draw all to the best; return how often costs were
     asked for.
     """
@@ -223,7 +227,7 @@ def _improve(sought: Sought, simplex: np.ndarray, costs: np.ndarray) -> int:
 
 
 @compiled
-def _beyond(sought: Sought, simplex: np.ndarray, share: float, point: np.ndarray) -> float:
+def _beyond(sought: NoiseSearch, simplex: np.ndarray, share: float, point: np.ndarray) -> float:
     """Fill a point (3,), and return its cost: from the worst corner beyond the centre of the others, by a share of the
     way to that.
     """
@@ -242,7 +246,7 @@ def _put(point: np.ndarray, cost: float, simplex: np.ndarray, costs: np.ndarray)
     costs[3] = cost
 
 
-def _noise_of(log: np.ndarray, time: np.ndarray, usual: Usual) -> Noise:
+def _noise_of(log: np.ndarray, time: np.ndarray, usual: SensorPrior) -> Noise:
     white, slow, lasts = np.exp(log).tolist()
     every = np.ones(time.size, dtype=bool)
     return Noise(
@@ -257,7 +261,7 @@ def _felt_directions(scaled: np.ndarray, level: float) -> np.ndarray:
     return U[:, felt] * s[felt]
 
 
-def _bounds(at: np.ndarray, r: np.ndarray, usual: Usual) -> tuple[np.ndarray, np.ndarray]:
+def _bounds(at: np.ndarray, r: np.ndarray, usual: SensorPrior) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest and highest log σ_w, log σ_s, log τ_s (3,) each.
 
     A fit that is far from the record leaves much that is no noise, and smooth: second differences hardly see it.
@@ -271,7 +275,7 @@ def _bounds(at: np.ndarray, r: np.ndarray, usual: Usual) -> tuple[np.ndarray, np
     return np.log(low), np.log(high)
 
 
-def _starts(at: np.ndarray, r: np.ndarray, F: np.ndarray, usual: Usual) -> np.ndarray:
+def _starts(at: np.ndarray, r: np.ndarray, F: np.ndarray, usual: SensorPrior) -> np.ndarray:
     """Return points all over the plausible (n, 3): what is left behind the parameters, divided in many ways."""
     ridge = np.eye(F.shape[1]) * usual.level**2
     left = r - F @ np.linalg.solve(F.T @ F + ridge, F.T @ r)

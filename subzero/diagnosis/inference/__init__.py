@@ -22,9 +22,9 @@ its evidence and its history                              input_estimation
 a formula for a latent force                              force_formula
 change points, forces and drifts beside the hypotheses    out_of_catalogue
 values that a record repeats in place of measurements     repeated_values
-what physics may do with a record, its linear evidence    data_error_yardstick
+what physics may do with a record, its linear evidence    data_error_saturated_model
 errors in the data, proposed by linear evidence           data_error_scan
-how close a few causes come to a record                   few_causes
+how close a few causes come to a record                   sparse_explanation
 errors in the data, suspected together                    data_error_search
 ... how probable a set of them is                         data_error_evidence
 ... and held against all else                             data_error_choice
@@ -52,16 +52,16 @@ from subzero.diagnosis.hypothesis.hypotheses import (
 )
 from subzero.diagnosis.hypothesis.noise import (
     Noise,
-    TimesBeside,
-    Usual,
+    CorrelationTimes,
+    SensorPrior,
     log_of_outlier,
     log_of_outliers,
     log_prior_of,
     resolution_of,
     spikes,
-    times_beside,
+    correlation_times_of,
 )
-from subzero.diagnosis.hypothesis.noise_estimate import Behind, estimate, log_marginal
+from subzero.diagnosis.hypothesis.noise_estimate import ResidualNoise, estimate, log_marginal
 from subzero.diagnosis.hypothesis.configuration import TRUTHS
 from subzero.diagnosis.inference.simulator import (
     RunCache,
@@ -72,7 +72,7 @@ from subzero.diagnosis.inference.simulator import (
     with_stops,
 )
 from subzero.diagnosis.inference.problem import Observed, Problem, Progress
-from subzero.diagnosis.inference.posing import pose, rewhitened, with_finer_steps, with_noise_behind
+from subzero.diagnosis.inference.posing import pose, rewhitened, with_finer_steps, with_residual_noise
 from subzero.diagnosis.inference.linear_gaussian import (
     KAPPAS,
     ForceInformation,
@@ -144,7 +144,7 @@ from subzero.diagnosis.inference.model_average import (
     is_near,
     qualified,
 )
-from subzero.diagnosis.inference.model_fits import gain_of_own_noise, log_evidence_of, with_own_noise
+from subzero.diagnosis.inference.model_fits import gain_of_refitted_noise, log_evidence_of, refit_noise
 from subzero.diagnosis.inference.out_of_catalogue import Findings, special_cases_folded
 
 from subzero.diagnosis.inference.repeated_values import (
@@ -164,10 +164,10 @@ __all__ = [
     "UNTRIED_LOG_POSTERIOR",
     "Added",
     "BaseRun",
-    "Behind",
     "Beliefs",
     "Candidate",
     "ChangePointSummary",
+    "CorrelationTimes",
     "DataError",
     "Findings",
     "Fit",
@@ -179,12 +179,12 @@ __all__ = [
     "Problem",
     "Progress",
     "Quadratic",
+    "ResidualNoise",
     "RunCache",
     "Scale",
     "Screening",
+    "SensorPrior",
     "Terms",
-    "TimesBeside",
-    "Usual",
     "all_columns",
     "at_bad_minimum",
     "bounded_step",
@@ -193,6 +193,7 @@ __all__ = [
     "candidate_of",
     "change_point_columns",
     "columns_of",
+    "correlation_times_of",
     "data_errors_undone",
     "decide",
     "describe",
@@ -204,7 +205,7 @@ __all__ = [
     "fit_change_points",
     "force_columns",
     "freed",
-    "gain_of_own_noise",
+    "gain_of_refitted_noise",
     "grown",
     "history",
     "is_near",
@@ -236,6 +237,7 @@ __all__ = [
     "quadratic_step",
     "qualified",
     "refit",
+    "refit_noise",
     "relinearised_force",
     "repeated_values",
     "resolution_of",
@@ -251,12 +253,10 @@ __all__ = [
     "special_cases_folded",
     "spikes",
     "steps_of",
-    "times_beside",
     "times_of",
     "variances",
     "with_finer_steps",
-    "with_noise_behind",
-    "with_own_noise",
+    "with_residual_noise",
     "with_stops",
     "with_tolerances",
     "without_force",

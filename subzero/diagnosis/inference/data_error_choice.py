@@ -6,10 +6,10 @@ and drifts, and an evidence on their scale (`data_error_evidence`).
 
 A search that is hopelessly behind ends within its first look, or with it. What the linear problem leaves no choice of
 is corrected before anything is searched, and the records with it are not searched at all if causes that hold throughout
-explain what is left (`is_clear`): what no vehicle does (another sign, unit or reference of one channel, exchanged
-columns, repeated values) where physics has no chance with all its parameters free at once; a command, a clock or a
-latency where a few causes, throughout or from mid-trial on, are hopelessly behind (`data_error_search`). A step in a
-sensor is always held against a search of the records with it.
+explain what is left (`excludes_physics`): what no vehicle does (another sign, unit or reference of one channel,
+exchanged columns, repeated values) where physics has no chance with all its parameters free at once; a command, a
+clock or a latency where a few causes, throughout or from mid-trial on, are hopelessly behind (`data_error_search`). A
+step in a sensor is always held against a search of the records with it.
 """
 
 from __future__ import annotations
@@ -35,29 +35,29 @@ from subzero.diagnosis.inference.data_error_evidence import (
     numbers_again,
     places_of,
     samples_of,
-    standing_of,
+    still_channels_of,
     without,
 )
 from subzero.diagnosis.inference.data_error_scan import log_prior
 from subzero.diagnosis.inference.data_error_search import (
     SuspectedError,
-    Suspicion,
+    Suspects,
     explain,
 )
 from subzero.diagnosis.inference.model_fits import log_evidence_of
 from subzero.diagnosis.inference.out_of_catalogue import Findings, is_explained, linear_of_first
 
 
-def is_clear(errors: Sequence[SuspectedError], work: Findings) -> bool:
+def excludes_physics(errors: Sequence[SuspectedError], work: Findings) -> bool:
     """Say whether errors need not be held against a search of the records with them: what is left then is explained
     without anything that begins in mid-trial, and without a force.
     """
     outside = max((error.log_posterior for error in work.out_of_catalogue), default=-np.inf)
     explained = work.search.best().log_posterior > outside and leaves_only_noise(work)
-    return explained and all(error.is_clear for error in errors)
+    return explained and all(error.excludes_physics for error in errors)
 
 
-class Look(Protocol):
+class DiagnosisSteps(Protocol):
     """A search for causes, what begins in mid-trial, forces and drifts, in three parts; it may be interrupted."""
 
     def start(self, records: Sequence[Logged]) -> Findings:
@@ -70,7 +70,9 @@ class Look(Protocol):
         """Find the rest."""
 
 
-def compared(suspicion: Suspicion, records: Sequence[Logged], look: Look) -> list[tuple[Explained, float]]:
+def compared(
+    suspicion: Suspects, records: Sequence[Logged], look: DiagnosisSteps
+) -> list[tuple[Explained, float]]:
     """Return what errors the data may have, with what explains the records besides and its log evidence.
 
     The records without what no vehicle does, and without what physics has no chance against, get a first look. If that
@@ -155,14 +157,14 @@ def _inside(
 class _Comparison:
     """Sets of suspected errors, held against one another: those whose first look was taken are in `tried`."""
 
-    suspicion: Suspicion
+    suspicion: Suspects
     records: Sequence[Logged]
-    look: Look
+    look: DiagnosisSteps
     tried: list[Explained] = field(default_factory=list)
 
     def with_more(self) -> None:
         """Hold what no vehicle does, and what physics has no chance against, against records with more errors."""
-        least, errors = self.suspicion.firm, self.suspicion.errors
+        least, errors = self.suspicion.definite_count, self.suspicion.errors
         first, more = (
             self.suspicion.first(least),
             [self.suspicion.first(k + 1) for k in range(least, len(errors))],
@@ -180,9 +182,9 @@ class _Comparison:
 
     def with_fewer(self) -> None:
         """Hold errors that are not clear against records with fewer of them corrected."""
-        least = self.suspicion.firm
+        least = self.suspicion.definite_count
         for held, errors in pairwise([self.suspicion.first(least), *self.suspicion.fewer(least)]):
-            if is_clear(held, _first(self.tried).work):
+            if excludes_physics(held, _first(self.tried).work):
                 break
             self._race(self._looks([errors]))
 
@@ -263,13 +265,15 @@ class _Comparison:
         """Say whether records without errors are hopelessly behind something that was tried, even with the causes of
         that: what is far from a run is not found around it.
         """
-        better = [suspect for suspect in self.tried if self._explained(errors, work).is_behind(suspect)]
+        better = [
+            suspect for suspect in self.tried if self._explained(errors, work).is_less_probable(suspect)
+        ]
         for error in better:
             if error.work.problem.entries is not work.problem.entries:
                 return False
             work.search.fit_like(error.work.search.best())
         now = self._explained(errors, work)
-        return any(now.is_behind(suspect) for suspect in better)
+        return any(now.is_less_probable(suspect) for suspect in better)
 
     def _race(self, new: Sequence[Explained]) -> None:
         """Finish what may be the most probable, of what is new among what was tried."""
@@ -277,7 +281,7 @@ class _Comparison:
         while waiting and _is_complete(self.tried):
             now = _first(waiting)
             waiting.remove(now)
-            if not any(now.is_behind(error) for error in self.tried):
+            if not any(now.is_less_probable(error) for error in self.tried):
                 self._fit_like_others(now.work)
                 self.look.finish(now.work)
 
@@ -301,7 +305,7 @@ class _Comparison:
             work=work,
             log_prior=float(prior),
             lost=self._lost(errors, work),
-            standing=standing_of(self.suspicion, errors, self.records),
+            standing=still_channels_of(self.suspicion, errors, self.records),
         )
 
     def _lost(self, errors: Sequence[SuspectedError], work: Findings) -> Counter[str]:

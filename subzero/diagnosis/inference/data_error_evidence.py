@@ -34,12 +34,12 @@ from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.hypothesis.noise import log_of_outlier, log_of_outliers
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
+from subzero.diagnosis.inference.data_error_saturated_model import LOUD
 from subzero.diagnosis.inference.data_error_scan import log_prior as log_prior_of_error
-from subzero.diagnosis.inference.data_error_yardstick import LOUD
 from subzero.diagnosis.inference.latent_force import FORCE
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, log_sum
 from subzero.diagnosis.inference.map_fit import is_poor_fit
-from subzero.diagnosis.inference.model_fits import gain_of_own_noise, log_density_of_noise
+from subzero.diagnosis.inference.model_fits import gain_of_refitted_noise, log_density_of_noise
 from subzero.diagnosis.inference.posing import posed_again, sensor_of
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
@@ -47,7 +47,7 @@ from subzero.diagnosis.inference.screening import linear_evidence
 from subzero.errors import UserError
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.inference.data_error_search import SuspectedError, Suspicion
+    from subzero.diagnosis.inference.data_error_search import SuspectedError, Suspects
     from subzero.diagnosis.inference.model_search import Search
     from subzero.diagnosis.inference.out_of_catalogue import Findings
 
@@ -90,7 +90,7 @@ def _is_quiet(work: Findings) -> bool:
     return True
 
 
-class Standing(NamedTuple):
+class StillChannel(NamedTuple):
     """A rounded channel of a record that repeats its value to the end (n,), and may be frozen."""
 
     record: int
@@ -138,12 +138,12 @@ def _own(problem: Problem, r: np.ndarray, record: int, channel: str) -> np.ndarr
     raise KeyError(channel)
 
 
-def standing_of(
-    whole: Suspicion, errors: Sequence[SuspectedError], records: Sequence[Logged]
-) -> tuple[Standing, ...]:
+def still_channels_of(
+    whole: Suspects, errors: Sequence[SuspectedError], records: Sequence[Logged]
+) -> tuple[StillChannel, ...]:
     """Return the rounded channels that are held to stand still where only some suspected errors are corrected."""
     return tuple(
-        Standing(error.record, error.error.channels[0], lost_by(error, errors, records))
+        StillChannel(error.record, error.error.channels[0], lost_by(error, errors, records))
         for error in whole.errors
         if error.may_stand_still and not any(error is each for each in errors)
     )
@@ -175,7 +175,7 @@ class Explained:
     work: Findings
     log_prior: float
     lost: Mapping[str, int]
-    standing: tuple[Standing, ...] = ()
+    standing: tuple[StillChannel, ...] = ()
 
     def log_evidence(self, per_lost: Mapping[str, float]) -> float:
         """Return the log evidence of the records as they were written; of samples that are lost, each so much as its
@@ -198,7 +198,7 @@ class Explained:
                 total[name] += _fixed(record, name) - 0.5 * square
         return {name: total[name] / count for name, count in samples.items() if count}
 
-    def is_behind(self, other: Explained) -> bool:
+    def is_less_probable(self, other: Explained) -> bool:
         """Say whether no more causes, nor better fits, bring it close to another that leaves only noise."""
         if other is self or not leaves_only_noise(other.work):
             return False
@@ -409,7 +409,7 @@ def _log_density(
         for ids, kappa in each
     ]
     best = variances(problem.entries, *each[int(np.argmax(logs))])
-    found = log_sum(logs) + gain_of_own_noise(problem, linear, best)
+    found = log_sum(logs) + gain_of_refitted_noise(problem, linear, best)
     return found + sum(
         log_density_of_noise(record, name) for record in problem.records for name in record.noise
     )
@@ -419,11 +419,11 @@ def _posed_like(search: Search, records: Sequence[Logged], errors: Errors, kept:
     """Return the problem of some samples of records without errors, with the noise behind the best fit."""
     new = posed_again(search.problem, without(records, errors))
     pairs = enumerate(zip(search.problem.records, new.records, strict=True))
-    made = [_seen_like(old, seen, kept[i], places_of(records[i], errors, i)) for i, (old, seen) in pairs]
+    made = [_similar(old, seen, kept[i], places_of(records[i], errors, i)) for i, (old, seen) in pairs]
     return replace(new, records=tuple(made))
 
 
-def _seen_like(
+def _similar(
     old: Observed, new: Observed, kept: Mapping[str, np.ndarray], where: Mapping[str, np.ndarray]
 ) -> Observed:
     """Return a record with the noise of another, and with what is known of the error of its steps; only with some of

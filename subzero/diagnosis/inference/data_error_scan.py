@@ -1,8 +1,8 @@
 """Which errors in the data would explain a record better: each correction judged against all that physics could do.
 
 An error in the data is suspected if the corrected record has an evidence that is ahead of the record's own as it is
-(`data_error_yardstick`), counted in the units in which it was written, and with what is known beforehand. Nothing is
-simulated for it, but once for each error of the commands. Whether it is one is for real fits to say
+(`data_error_saturated_model`), counted in the units in which it was written, and with what is known beforehand.
+Nothing is simulated for it, but once for each error of the commands. Whether it is one is for real fits to say
 (`data_error_choice`).
 """
 
@@ -28,12 +28,12 @@ from subzero.diagnosis.hypothesis.data_error import (
     DataError,
 )
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.hypothesis.noise import level_of, resolution_of, usual_noise, usual_of
+from subzero.diagnosis.hypothesis.noise import level_of, prior_noise, resolution_of, sensor_prior
 from subzero.diagnosis.inference.repeated_values import log_odds_of_frozen, steps_of
 from subzero.records.consistency import MISTAKEN
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.inference.data_error_yardstick import Reckoned, Term, Yardstick
+    from subzero.diagnosis.inference.data_error_saturated_model import Evidence, SaturatedModel, Term
 
 
 FEWEST = 6
@@ -78,30 +78,30 @@ class Suspect(NamedTuple):
     generous: float
 
 
-def suspects(yardstick: Yardstick, trusted: frozenset[str] = frozenset()) -> list[Suspect]:
+def suspects(saturated: SaturatedModel, trusted: frozenset[str] = frozenset()) -> list[Suspect]:
     """Return the errors that would explain a record better, the most probable first.
 
     Args:
-        yardstick: of the record.
+        saturated: of the record.
         trusted: channels that the user has said are right as they are.
     """
     rough = []
-    for group in possible(yardstick, trusted):
+    for group in possible(saturated, trusted):
         group = group._replace(
-            each=[suspect for suspect in group.each if not _is_known(suspect, yardstick.corrected)]
+            each=[suspect for suspect in group.each if not _is_known(suspect, saturated.corrected)]
         )
-        each = [_judged(yardstick, suspect, group) for suspect in group.each]
+        each = [_judged(saturated, suspect, group) for suspect in group.each]
         rough += [(peak, group) for peak in (_peaks(each) if group.step else each)]
     close = [
-        (_judged(yardstick, suspect.error, group, closer=True), group)
+        (_judged(saturated, suspect.error, group, closer=True), group)
         for suspect, group in rough
-        if suspect.generous > HOPELESS or _may_be_commanded(yardstick, suspect.error)
+        if suspect.generous > HOPELESS or _may_be_commanded(saturated, suspect.error)
     ]
     lead = max((suspect.lead for suspect, _ in close), default=-np.inf)
     found: dict[str, Suspect] = {}
     for error, group in close:
         if error.lead > max(UNREFINED, lead - FAR_BEHIND) and (group.step or error.error.kind == "step"):
-            error = _refined(yardstick, error, group)
+            error = _refined(saturated, error, group)
         if error.lead > found.get(error.error.id, error).lead or error.error.id not in found:
             found[error.error.id] = error
     return sorted(
@@ -109,17 +109,17 @@ def suspects(yardstick: Yardstick, trusted: frozenset[str] = frozenset()) -> lis
     )
 
 
-def judged_as_it_is(yardstick: Yardstick, error: DataError) -> Suspect:
+def judged_as_it_is(saturated: SaturatedModel, error: DataError) -> Suspect:
     """Return how an error is judged in another record, or with others corrected."""
-    return _judged(yardstick, error, _group_of(yardstick, error), closer=True)
+    return _judged(saturated, error, _group_of(saturated, error), closer=True)
 
 
-def clock_below_least(yardstick: Yardstick) -> Suspect | None:
+def clock_below_least(saturated: SaturatedModel) -> Suspect | None:
     """Return a clock that is late by less than an error, if that explains a record better than as it is, and than any
     clock that is later: a cause like others, but one that the linear problem says little of.
     """
     least, group = LEAST["late_clock"], Group([], is_read_off=True)
-    judge = partial(_judged, yardstick, group=group, closer=True)
+    judge = partial(_judged, saturated, group=group, closer=True)
     sizes = np.arange(0.5 * CLOCK_STEP_S, least + CLOCK_STEP_S, 0.5 * CLOCK_STEP_S)
     both = [side * float(size) for size in sizes for side in (1.0, -1.0)]
     each = [judge(DataError(kind="late_clock", amount=amount)) for amount in both]
@@ -130,21 +130,21 @@ def clock_below_least(yardstick: Yardstick) -> Suspect | None:
     return best if best.lead > 0.0 and abs(best.error.amount) < least else None
 
 
-def likeliest(yardstick: Yardstick, errors: Sequence[DataError]) -> DataError:
+def likeliest(saturated: SaturatedModel, errors: Sequence[DataError]) -> DataError:
     """Return the most probable of errors that are read off a record, and may be as small as they are."""
     group = Group(list(errors), is_read_off=True)
-    return max(errors, key=lambda error: _judged(yardstick, error, group, closer=True).lead)
+    return max(errors, key=lambda error: _judged(saturated, error, group, closer=True).lead)
 
 
-def judged_again(yardstick: Yardstick, error: DataError) -> Suspect:
+def judged_again(saturated: SaturatedModel, error: DataError) -> Suspect:
     """Return the same with its numbers found anew."""
-    suspect, group = judged_as_it_is(yardstick, error), _group_of(yardstick, error)
-    return _refined(yardstick, suspect, group) if group.step or error.kind == "step" else suspect
+    suspect, group = judged_as_it_is(saturated, error), _group_of(saturated, error)
+    return _refined(saturated, suspect, group) if group.step or error.kind == "step" else suspect
 
 
-def _group_of(yardstick: Yardstick, error: DataError) -> Group:
+def _group_of(saturated: SaturatedModel, error: DataError) -> Group:
     """Return the errors that share the probability of one, those that only the record itself tells by themselves."""
-    groups = possible(yardstick, frozenset())
+    groups = possible(saturated, frozenset())
     found = (group for group in groups if any(suspect.id == error.id for suspect in group.each))
     return next(found, Group([error]))
 
@@ -170,88 +170,88 @@ def log_prior(error: DataError, alike: int) -> float:
     return float(np.log(ANY * KINDS[error.kind].share / (1.0 - ANY)) + among)
 
 
-def _judged(yardstick: Yardstick, error: DataError, group: Group, *, closer: bool = False) -> Suspect:
+def _judged(saturated: SaturatedModel, error: DataError, group: Group, *, closer: bool = False) -> Suspect:
     """Return by how much a record is more probable with an error in its data than without."""
-    logged = yardstick.without(error)
-    is_of_all = error.is_of_clock or error.is_of_commands or not yardstick.is_last(error)
-    touched = list(yardstick.own) if is_of_all else list(error.channels)
-    there = yardstick.under(logged) if closer and error.is_of_commands else yardstick
+    logged = saturated.without(error)
+    is_of_all = error.is_of_clock or error.is_of_commands or not saturated.is_last(error)
+    touched = list(saturated.own) if is_of_all else list(error.channels)
+    there = saturated.under(logged) if closer and error.is_of_commands else saturated
     there = there.with_scale_held(error.channels) if error.kind == "unit" else there
-    terms = {**yardstick.own, **there.terms(logged, touched)}
-    is_small = not group.is_read_off and _is_small(yardstick, error)
+    terms = {**saturated.own, **there.terms(logged, touched)}
+    is_small = not group.is_read_off and _is_small(saturated, error)
     if min(terms[name].samples for name in touched) < FEWEST or is_small:
         return Suspect(error, -np.inf, -np.inf)
     odds = log_prior(error, len(group.each))
     odds += error.log_jacobian * sum(terms[name].measured for name in error.channels if name in terms)
-    generous = odds + _lost(yardstick, error, terms, yardstick.as_is)
-    generous += there.generous(terms) - yardstick.as_is.log
+    generous = odds + _lost(saturated, error, terms, saturated.as_is)
+    generous += there.generous(terms) - saturated.as_is.log
     if not closer:
         return Suspect(error, float(generous), float(generous))
-    lead = odds + _lost(yardstick, error, terms, yardstick.likeliest)
-    lead += there.sparse(terms) - yardstick.log_sparse
+    lead = odds + _lost(saturated, error, terms, saturated.likeliest)
+    lead += there.sparse(terms) - saturated.log_sparse
     return Suspect(error, float(lead), float(generous))
 
 
-def _is_small(yardstick: Yardstick, error: DataError) -> bool:
+def _is_small(saturated: SaturatedModel, error: DataError) -> bool:
     """Say whether the number of an error is too small to be one. Where a rounded channel stands still, what rounding
     takes off is the same for long, and a step in the sensor of some of its resolution explains it.
     """
     if error.kind != "step":
         return abs(error.amount) < LEAST.get(error.kind, 0.0)
     (name,) = error.channels
-    usual = usual_of(name, yardstick.logged.record.values[name], yardstick.logged.noise)
+    usual = sensor_prior(name, saturated.logged.record.values[name], saturated.logged.noise)
     return abs(error.amount) < LEAST_STEP_LEVELS * np.hypot(usual.level, usual.resolution / np.sqrt(12.0))
 
 
-def _may_be_commanded(yardstick: Yardstick, error: DataError) -> bool:
+def _may_be_commanded(saturated: SaturatedModel, error: DataError) -> bool:
     """Say whether the nominal model under other commands comes closer to a record: with the sensitivities under those
     that are said to have been given, all of physics at once says little of others.
     """
     if not error.is_of_commands:
         return False
-    terms = yardstick.terms(yardstick.without(error), yardstick.own)
-    return yardstick.sparse(terms) - yardstick.log_sparse > HOPELESS
+    terms = saturated.terms(saturated.without(error), saturated.own)
+    return saturated.sparse(terms) - saturated.log_sparse > HOPELESS
 
 
-def may_stand_still(yardstick: Yardstick, error: DataError) -> bool:
+def may_stand_still(saturated: SaturatedModel, error: DataError) -> bool:
     """Say whether a channel that seems to be frozen may only stand still, as it is rounded."""
-    return error.kind == "frozen" and error in yardstick.repeated
+    return error.kind == "frozen" and error in saturated.repeated
 
 
-def _stuck(yardstick: Yardstick, error: DataError, as_is: Reckoned) -> float:
+def _stuck(saturated: SaturatedModel, error: DataError, as_is: Evidence) -> float:
     """Return what the values that a rounded channel repeats to the end add to the log evidence of the record as it is,
     and the log odds that it is frozen, not standing still: where each value is an interval (`repeated_values`).
     """
     (name,) = error.channels
-    logged = yardstick.without(error)
-    record, kept = yardstick.logged.record, logged.record.values[name]
+    logged = saturated.without(error)
+    record, kept = saturated.logged.record, logged.record.values[name]
     known = np.isfinite(record.values[name])
     run = ~np.isfinite(kept[known])
     if not run.any():
         return -np.inf
-    usual = usual_of(name, record.values[name], yardstick.logged.noise)
-    steps = steps_of(record.time[known], yardstick.deviations(name, as_is.z)[known], usual)
-    rest = yardstick.terms(logged, [name])[name]
-    return yardstick.added(name, rest, as_is) + log_odds_of_frozen(steps, run)
+    usual = sensor_prior(name, record.values[name], saturated.logged.noise)
+    steps = steps_of(record.time[known], saturated.deviations(name, as_is.z)[known], usual)
+    rest = saturated.terms(logged, [name])[name]
+    return saturated.added(name, rest, as_is) + log_odds_of_frozen(steps, run)
 
 
-def _lost(yardstick: Yardstick, error: DataError, terms: Mapping[str, Term], as_is: Reckoned) -> float:
+def _lost(saturated: SaturatedModel, error: DataError, terms: Mapping[str, Term], as_is: Evidence) -> float:
     """Return what samples that are no measurements any more added to the evidence of the record as it is, on average;
     of one that may only stand still, what these samples added, and the odds that it does not.
     """
-    if may_stand_still(yardstick, error):
-        return _stuck(yardstick, error, as_is)
-    if not any(yardstick.own[name].measured - terms[name].measured for name in yardstick.own):
+    if may_stand_still(saturated, error):
+        return _stuck(saturated, error, as_is)
+    if not any(saturated.own[name].measured - terms[name].measured for name in saturated.own):
         return 0.0
-    return sum(yardstick.of_lost(name, lost, as_is) for name, lost in yardstick.lost_by(error).items())
+    return sum(saturated.of_lost(name, lost, as_is) for name, lost in saturated.lost_by(error).items())
 
 
-def _refined(yardstick: Yardstick, suspect: Suspect, group: Group) -> Suspect:
+def _refined(saturated: SaturatedModel, suspect: Suspect, group: Group) -> Suspect:
     """Return an error with the numbers that are best close to those that were tried."""
-    judge = partial(_judged, yardstick, group=group, closer=True)
+    judge = partial(_judged, saturated, group=group, closer=True)
     if group.step:
         return best_number(judge, suspect, group.step)
-    time = yardstick.time
+    time = saturated.time
     at, span = int(np.searchsorted(time, suspect.error.since)), max(time.size // STEP_TIMES, 1)
     around = time[max(at - span, 1) : at + span + 1 : max(span // 4, 1)]
     for _ in range(2):
@@ -308,17 +308,17 @@ class Group(NamedTuple):
     is_read_off: bool = False
 
 
-def possible(yardstick: Yardstick, trusted: frozenset[str]) -> list[Group]:
+def possible(saturated: SaturatedModel, trusted: frozenset[str]) -> list[Group]:
     """Return all errors that a record may have, but for repeated values."""
-    values, time = yardstick.logged.record.values, yardstick.logged.record.time
-    names = [name for name in values if name in yardstick.nominal]
+    values, time = saturated.logged.record.values, saturated.logged.record.time
+    names = [name for name in values if name in saturated.nominal]
     open_ = [name for name in names if name not in trusted]
     units = [
         DataError(kind="unit", channels=(name,), how=how)
         for name in open_
         for how in MISTAKEN.get(BY_NAME[name].unit, {})
     ]
-    units = [unit for unit in units if _is_quiet(yardstick, unit)]
+    units = [unit for unit in units if _is_quiet(saturated, unit)]
     pairs = [DataError(kind="swapped", channels=pair) for pair in itertools.combinations(open_, 2)]
     found = [
         Group([DataError(kind="sign", channels=(name,)) for name in open_]),
@@ -331,26 +331,26 @@ def possible(yardstick: Yardstick, trusted: frozenset[str]) -> list[Group]:
             ]
         ),
         Group(pairs),
-        Group([error for error in yardstick.repeated if error.channels[0] in open_]),
+        Group([error for error in saturated.repeated if error.channels[0] in open_]),
     ]
-    found += [Group([error for name in open_ for error in _step(yardstick, name)]), *_clocks(time, open_)]
-    if yardstick.logged.setting.trial.commands is not None:
-        found += _commands(yardstick.logged)
+    found += [Group([error for name in open_ for error in _step(saturated, name)]), *_clocks(time, open_)]
+    if saturated.logged.setting.trial.commands is not None:
+        found += _commands(saturated.logged)
     return [group for group in found if group.each]
 
 
-def _is_quiet(yardstick: Yardstick, error: DataError) -> bool:
+def _is_quiet(saturated: SaturatedModel, error: DataError) -> bool:
     """Say whether a channel's noise from sample to sample is that of a sensor, once it is in the right unit.
 
     Where the prediction fails, any unit that makes a record smaller than it would be as likely; but not its noise.
     """
     (name,) = error.channels
-    record = error.corrected(yardstick.logged).record
+    record = error.corrected(saturated.logged).record
     known = record.values[name][np.isfinite(record.values[name])]
-    level = level_of(name, yardstick.logged.noise)
+    level = level_of(name, saturated.logged.noise)
     if known.size < FEWEST or np.ptp(known) == 0.0:
         return False
-    expected = yardstick.at(yardstick.nominal[name], record.time)
+    expected = saturated.at(saturated.nominal[name], record.time)
     jitter = _jitter(known) + resolution_of(known, level) / np.sqrt(12.0)
     return jitter < LOUDEST * level + 2.0 * _jitter(expected)
 
@@ -395,22 +395,22 @@ def _different(logged: Logged, errors: Iterable[DataError]) -> list[DataError]:
     return list(found.values())
 
 
-def _step(yardstick: Yardstick, name: str) -> list[DataError]:
+def _step(saturated: SaturatedModel, name: str) -> list[DataError]:
     """Return the step in a sensor that explains most of what the generous fit leaves of its channel."""
-    record, here = yardstick.logged.record, yardstick.as_is
+    record, here = saturated.logged.record, saturated.as_is
     values, time = record.values[name], record.time
-    expected = yardstick.at(yardstick.nominal[name], time)
+    expected = saturated.at(saturated.nominal[name], time)
     values = turned(values, expected) if name == HEADING else values
-    usual = usual_of(name, values, yardstick.logged.noise)
+    usual = sensor_prior(name, values, saturated.logged.noise)
     used = np.isfinite(values)
-    noise = usual_noise(time, used, usual)
+    noise = prior_noise(time, used, usual)
     begins = time[0] + (time[-1] - time[0]) * np.linspace(STEP_MARGIN, 1.0 - STEP_MARGIN, STEP_TIMES)
     steps = (time[:, None] >= begins).astype(float)
     rows = np.column_stack(
         [
-            values - expected - yardstick.at(yardstick.slopes[name], time) @ here.z,
+            values - expected - saturated.at(saturated.slopes[name], time) @ here.z,
             steps,
-            yardstick.at(yardstick.slopes[name], time),
+            saturated.at(saturated.slopes[name], time),
         ]
     )
     white = noise.whiten(rows) / here.scales[name]

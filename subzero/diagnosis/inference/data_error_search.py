@@ -6,8 +6,8 @@ what is not needed any more is dropped, the weakest first. So the first of two e
 something else while the second was there, is judged as the second is: by what it adds. A clock that is late by less
 than an error is a cause, but no linear one: where both explain more, errors are judged beside it.
 
-How far physics comes towards a record without them is looked at before any search, too (`few_causes`): an error of the
-data that is far ahead of that needs no search of the record as it is.
+How far physics comes towards a record without them is looked at before any search, too (`sparse_explanation`): an
+error of the data that is far ahead of that needs no search of the record as it is.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.inference.data_error_saturated_model import LOUD, SaturatedModel, saturated_model_of
 from subzero.diagnosis.inference.data_error_scan import (
     FAR_BEHIND,
     Suspect,
@@ -30,12 +31,11 @@ from subzero.diagnosis.inference.data_error_scan import (
     may_stand_still,
     suspects,
 )
-from subzero.diagnosis.inference.data_error_yardstick import LOUD, Yardstick, yardstick_of
-from subzero.diagnosis.inference.few_causes import most_of_one_cause, most_of_physics
 from subzero.diagnosis.inference.map_fit import bounds
 from subzero.diagnosis.inference.posing import posed_again
 from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.repeated_values import may_be_measured, repeated_values, steps_off_grid
+from subzero.diagnosis.inference.sparse_explanation import most_of_one_cause, most_of_physics
 
 MOST_ERRORS = 3
 """Of a record, beside values that are repeated."""
@@ -61,8 +61,8 @@ SIGNATURE_LEAD = 200.0
 class SuspectedError:
     """An error of a record, its leads with all others corrected, and those that the record cannot tell from it; `left`
     is the noise of the channel that is explained worst without all of them, in usual levels, with all of physics to
-    help; `is_clear` says that it leaves physics no chance in the linear problem; `may_stand_still` that a channel
-    that seems to be frozen is rounded; `is_read_off` that it is read off the record's values.
+    help; `excludes_physics` says that it leaves physics no chance in the linear problem; `may_stand_still` that a
+    channel that seems to be frozen is rounded; `is_read_off` that it is read off the record's values.
     """
 
     record: int
@@ -71,12 +71,12 @@ class SuspectedError:
     generous: float
     alike: tuple[DataError, ...] = ()
     left: float = np.inf
-    is_clear: bool = False
+    excludes_physics: bool = False
     may_stand_still: bool = False
     is_read_off: bool = False
 
 
-def is_soft(error: SuspectedError) -> bool:
+def mimicked_by_physics(error: SuspectedError) -> bool:
     """Say whether something that a vehicle does may look like an error: not like one that the values tell."""
     return error.error.kind in SOFT and not error.is_read_off
 
@@ -89,7 +89,7 @@ def explain(errors: Sequence[SuspectedError]) -> bool:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Suspicion:
+class Suspects:
     """What a scan of records says of errors in their data.
 
     Attributes:
@@ -100,26 +100,29 @@ class Suspicion:
 
     def first(self, count: int) -> tuple[SuspectedError, ...]:
         """Return so many of them, in their order: first what is clear, then what no vehicle does, the best first."""
-        ranked = sorted(self.errors, key=lambda error: (not error.is_clear, is_soft(error), -error.lead))
+        ranked = sorted(
+            self.errors,
+            key=lambda error: (not error.excludes_physics, mimicked_by_physics(error), -error.lead),
+        )
         return tuple(error for error in self.errors if any(error is each for each in ranked[:count]))
 
     @property
-    def firm(self) -> int:
+    def definite_count(self) -> int:
         """How many of them leave physics no chance, or are what no vehicle does."""
-        return sum(error.is_clear or not is_soft(error) for error in self.errors)
+        return sum(error.excludes_physics or not mimicked_by_physics(error) for error in self.errors)
 
     def fewer(self, count: int) -> list[tuple[SuspectedError, ...]]:
         """Return the sets with less than so many of them: with one after the other of those that are not clear taken
         away, and with none.
         """
-        clear = sum(error.is_clear for error in self.errors)
+        clear = sum(error.excludes_physics for error in self.errors)
         return [*(self.first(k) for k in reversed(range(max(clear, 1), count))), ()] if count else []
 
 
-def suspected(problem: Problem, records: Sequence[Logged]) -> Suspicion:
+def suspected(problem: Problem, records: Sequence[Logged]) -> Suspects:
     """Return what errors the data of some records may have."""
     each = [_of_record(problem, records, i) for i in range(len(records))]
-    return Suspicion(errors=tuple(error for found in each for error in found))
+    return Suspects(errors=tuple(error for found in each for error in found))
 
 
 Physics = Callable[[Problem, int], float]
@@ -138,19 +141,21 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
     logged = records[record]
     repeated = repeated_values(logged, logged.trusted)
     unclear = tuple(error for error in repeated if may_be_measured(error, logged))
-    begun = replace(yardstick_of(problem, record, logged), repeated=unclear)
+    started = replace(saturated_model_of(problem, record, logged), repeated=unclear)
     read_off = [error for error in repeated if not may_be_measured(error, logged)]
     jumps = steps_off_grid(logged, logged.trusted)
-    read_off += [likeliest(begun, begun.by_whole_steps(jump)) for jump in jumps]
-    begun, found = _beside_clock(begun, read_off, _forward(begun, read_off, logged.trusted), logged.trusted)
-    found = _by_clock_of_others(begun, read_off, found, logged.trusted)
-    found = _closer(problem, record, begun, read_off, _back(begun, read_off, found))
+    read_off += [likeliest(started, started.by_whole_steps(jump)) for jump in jumps]
+    started, found = _with_clock_error(
+        started, read_off, _forward(started, read_off, logged.trusted), logged.trusted
+    )
+    found = _by_clock_of_others(started, read_off, found, logged.trusted)
+    found = _closer(problem, record, started, read_off, _back(started, read_off, found))
     made = [*(_Judged(Suspect(error, SIGNATURE_LEAD, SIGNATURE_LEAD), ()) for error in read_off), *found]
     against = _Against(
         problem=problem,
         records=records,
         record=record,
-        begun=begun,
+        started=started,
         read_off=len(read_off),
         errors=tuple(error.suspect.error for error in made),
     )
@@ -166,28 +171,28 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
             generous=error.generous,
             alike=alike,
             left=left,
-            is_clear=any(error.error is other for other in clear),
-            may_stand_still=may_stand_still(begun, error.error),
+            excludes_physics=any(error.error is other for other in clear),
+            may_stand_still=may_stand_still(started, error.error),
             is_read_off=i < len(read_off),
         )
         for i, (error, alike) in enumerate(made)
     ]
 
 
-def _beside_clock(
-    begun: Yardstick, read_off: Sequence[DataError], found: list[_Judged], trusted: frozenset[str]
-) -> tuple[Yardstick, list[_Judged]]:
+def _with_clock_error(
+    started: SaturatedModel, read_off: Sequence[DataError], found: list[_Judged], trusted: frozenset[str]
+) -> tuple[SaturatedModel, list[_Judged]]:
     """Return errors that came out one after the other, with what they are judged by: beside a clock that is late by
     less than an error, where a vehicle may look like some of them, and that explains more.
     """
     soft = any(error.suspect.error.kind in SOFT for error in found)
-    clock = clock_below_least(begun.after(read_off)) if soft else None
+    clock = clock_below_least(started.after(read_off)) if soft else None
     if clock is None:
-        return begun, found
-    there = replace(begun, clock=(clock.error,))
+        return started, found
+    there = replace(started, clock=(clock.error,))
     others = _forward(there, read_off, trusted)
     explains_more = clock.lead + _total_lead(others) > _total_lead(found)
-    return (there, others) if explains_more else (begun, found)
+    return (there, others) if explains_more else (started, found)
 
 
 def _total_lead(found: Sequence[_Judged]) -> float:
@@ -196,7 +201,7 @@ def _total_lead(found: Sequence[_Judged]) -> float:
 
 
 def _by_clock_of_others(
-    begun: Yardstick, read_off: Sequence[DataError], found: list[_Judged], trusted: frozenset[str]
+    started: SaturatedModel, read_off: Sequence[DataError], found: list[_Judged], trusted: frozenset[str]
 ) -> list[_Judged]:
     """Return errors, or what comes out better with the clock of a channel that seems to be late besides: if most
     channels say little, the one that is early by itself has set the clock of all.
@@ -205,20 +210,23 @@ def _by_clock_of_others(
     later = [suspect.suspect.error.amount for suspect in found if suspect.suspect.error.kind == "latency"]
     tried = [found]
     for error in (replace(clock, amount=clock.amount + more) for clock in clocks for more in later):
-        first = _Judged(judged_again(begun.after(read_off), error), ())
-        tried.append(_forward(begun, read_off, trusted, [first]))
+        first = _Judged(judged_again(started.after(read_off), error), ())
+        tried.append(_forward(started, read_off, trusted, [first]))
     return max(tried, key=_total_lead)
 
 
 def _forward(
-    begun: Yardstick, read_off: Sequence[DataError], trusted: frozenset[str], first: Sequence[_Judged] = ()
+    started: SaturatedModel,
+    read_off: Sequence[DataError],
+    trusted: frozenset[str],
+    first: Sequence[_Judged] = (),
 ) -> list[_Judged]:
     """Return the errors that come out best one after the other, each with those before it corrected."""
     found = [*first]
     for _ in range(MOST_ERRORS - len(found)):
         before = [*read_off, *(error.suspect.error for error in found)]
-        ranked = suspects(begun.after(before), trusted)
-        while ranked and _is_suspected(ranked[0]) and _makes_loud(begun, before, ranked[0].error):
+        ranked = suspects(started.after(before), trusted)
+        while ranked and _is_suspected(ranked[0]) and _adds_noise(started, before, ranked[0].error):
             ranked = ranked[1:]
         if not ranked or not _is_suspected(ranked[0]):
             break
@@ -229,19 +237,19 @@ def _forward(
     return found
 
 
-def _makes_loud(begun: Yardstick, before: Sequence[DataError], error: DataError) -> bool:
+def _adds_noise(started: SaturatedModel, before: Sequence[DataError], error: DataError) -> bool:
     """Say whether a channel is no more that of a usual sensor without an error, and is with it: where a rounded heading
     hardly leaves a value, radians explain its steps, and nothing else of it.
     """
-    scales, after = begun.after(before).as_is.scales, begun.after([*before, error]).as_is.scales
+    scales, after = started.after(before).as_is.scales, started.after([*before, error]).as_is.scales
     return any(scales.get(name, 0.0) < LOUD <= after.get(name, 0.0) for name in error.channels)
 
 
-def _back(begun: Yardstick, read_off: Sequence[DataError], found: list[_Judged]) -> list[_Judged]:
+def _back(started: SaturatedModel, read_off: Sequence[DataError], found: list[_Judged]) -> list[_Judged]:
     """Return the errors that are still needed with all others corrected, judged so."""
     last = len(found) - 1  # is judged so already
     while len(found) > 1:
-        found = [error if i == last else _again(begun, read_off, found, i) for i, error in enumerate(found)]
+        found = [error if i == last else _again(started, read_off, found, i) for i, error in enumerate(found)]
         weakest = min(found, key=lambda error: error.suspect.lead - _least(error.suspect))
         if _is_suspected(weakest.suspect):
             break
@@ -250,7 +258,11 @@ def _back(begun: Yardstick, read_off: Sequence[DataError], found: list[_Judged])
 
 
 def _closer(
-    problem: Problem, record: int, begun: Yardstick, read_off: Sequence[DataError], found: list[_Judged]
+    problem: Problem,
+    record: int,
+    started: SaturatedModel,
+    read_off: Sequence[DataError],
+    found: list[_Judged],
 ) -> list[_Judged]:
     """Return the errors that are still suspected where the problem is linear close to what explains the record without
     them: far from the nominal model it errs by as much as a delay does. Of those of commands it is simulated anyway.
@@ -258,20 +270,22 @@ def _closer(
     errors = [*read_off, *(error.suspect.error for error in found)]
     if not any(error.kind in SOFT for error in errors) or any(error.is_of_commands for error in errors):
         return found
-    z = np.clip(begun.after(errors).likeliest.z, *bounds(problem))
+    z = np.clip(started.after(errors).likeliest.z, *bounds(problem))
     if not np.isfinite(problem.residual(z)).all():
         return found
     there = replace(
-        yardstick_of(problem, record, begun.logged, z), repeated=begun.repeated, clock=begun.clock
+        saturated_model_of(problem, record, started.logged, z), repeated=started.repeated, clock=started.clock
     )
     found = [_again(there, read_off, found, i) for i in range(len(found))]
     return [error for error in found if _is_suspected(error.suspect)]
 
 
-def _again(begun: Yardstick, read_off: Sequence[DataError], found: Sequence[_Judged], i: int) -> _Judged:
+def _again(
+    started: SaturatedModel, read_off: Sequence[DataError], found: Sequence[_Judged], i: int
+) -> _Judged:
     """Return one of some errors, judged with all others corrected."""
     others = [error.suspect.error for k, error in enumerate(found) if k != i]
-    after = begun.after([*read_off, *others], len(read_off) + i)
+    after = started.after([*read_off, *others], len(read_off) + i)
     return found[i]._replace(suspect=judged_again(after, found[i].suspect.error))
 
 
@@ -293,7 +307,7 @@ class _Against:
     problem: Problem
     records: Sequence[Logged]
     record: int
-    begun: Yardstick
+    started: SaturatedModel
     errors: tuple[DataError, ...]
     read_off: int
     kept: dict[tuple[Physics, tuple[int, ...]], float] = field(default_factory=dict)
@@ -301,7 +315,7 @@ class _Against:
     @property
     def left(self) -> float:
         """The noise of the channel that is explained worst without all of them, in usual levels."""
-        return max(self.begun.after(self.errors).as_is.scales.values(), default=np.inf)
+        return max(self.started.after(self.errors).as_is.scales.values(), default=np.inf)
 
     @property
     def soft(self) -> list[DataError]:
@@ -311,10 +325,10 @@ class _Against:
     def few_causes_explain_more(self) -> bool:
         """Say whether soft errors, with a few causes beside them, are far behind a few causes in their place."""
         some = self.soft
-        beside = self._beside(self.errors, most_of_physics) if some else 0.0
+        beside = self._with_others(self.errors, most_of_physics) if some else 0.0
         return bool(some) and self.lead(some, most_of_physics) + beside < -FAR_BEHIND
 
-    def are_far_ahead(self, some: Sequence[DataError]) -> bool:
+    def lead_clearly(self, some: Sequence[DataError]) -> bool:
         """Say whether some errors are far ahead of a few causes, and of one of any size, with all others corrected:
         where these explain most of what the errors do, the rest may be what the linear problem does not know.
         """
@@ -323,14 +337,14 @@ class _Against:
 
     def lead(self, some: Sequence[DataError], physics: Physics) -> float:
         """Return by how much some errors are more probable than some physics, with all others corrected."""
-        return self._alone(some) - self._beside(self._others(some), physics)
+        return self._alone(some) - self._with_others(self._others(some), physics)
 
     def _alone(self, some: Sequence[DataError]) -> float:
         """Return by how much some errors are more probable than none, with all others corrected."""
         held, lead = self._others(some), 0.0
         for error in some:
             place = sum(self._at(other) < self._at(error) for other in held)
-            lead += judged_as_it_is(self.begun.after(held, place), error).lead
+            lead += judged_as_it_is(self.started.after(held, place), error).lead
             held.insert(place, error)
         return lead
 
@@ -340,11 +354,11 @@ class _Against:
     def _at(self, error: DataError) -> int:
         return next(i for i, other in enumerate(self.errors) if other is error)
 
-    def _beside(self, held: Sequence[DataError], physics: Physics) -> float:
+    def _with_others(self, held: Sequence[DataError], physics: Physics) -> float:
         """Return by how much some physics is more probable than the yardstick, where errors are corrected."""
         key = (physics, tuple(self._at(error) for error in held))
         if key not in self.kept:
-            after = self.begun.after(held)
+            after = self.started.after(held)
             each = [after.logged if i == self.record else record for i, record in enumerate(self.records)]
             most = physics(posed_again(self.problem, each), self.record)
             self.kept[key] = most + after.log_none - after.log_sparse
@@ -358,22 +372,24 @@ def _clear(against: _Against, made: Sequence[Suspect]) -> list[DataError]:
     a force or a drift may be as sudden.
     """
     soft = against.soft
-    firm = [error for error in made if not any(error.error is each for each in soft)]
+    definite_count = [error for error in made if not any(error.error is each for each in soft)]
     clear = [
-        error.error for error in firm if error.lead > CLEAR_LEAD and error.generous > CLEAR_GENEROUS_LEAD
+        error.error
+        for error in definite_count
+        if error.lead > CLEAR_LEAD and error.generous > CLEAR_GENEROUS_LEAD
     ]
     clear = [
         error
         for error in clear
-        if not may_stand_still(against.begun, error) or against.lead([error], most_of_physics) > CLEAR_LEAD
+        if not may_stand_still(against.started, error) or against.lead([error], most_of_physics) > CLEAR_LEAD
     ]
     likely = [
         error.error for error in made if error.lead > FAR_BEHIND and any(error.error is each for each in soft)
     ]
     likely = [error for error in likely if error.kind != "step"]
-    if not likely or against.left >= LOUD or not against.are_far_ahead(soft):
+    if not likely or against.left >= LOUD or not against.lead_clearly(soft):
         return clear
-    return clear + [error for error in likely if len(soft) == 1 or against.are_far_ahead([error])]
+    return clear + [error for error in likely if len(soft) == 1 or against.lead_clearly([error])]
 
 
 def _is_suspected(suspect: Suspect) -> bool:

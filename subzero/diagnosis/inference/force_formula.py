@@ -26,7 +26,7 @@ from subzero.diagnosis.inference.latent_force import (
     shape_weight,
     shifted,
     size_of,
-    usual_force,
+    typical_force,
 )
 from subzero.diagnosis.inference.linear_gaussian import AMPLITUDE_SHARES, ForceInformation, log_sum
 
@@ -87,7 +87,7 @@ def describe(found: EstimatedForce) -> Formula:
     axis = found.unknown.axis
     own = found.knots.record == found.record
     data = ForceInformation(found.data.M[np.ix_(own, own)], found.data.q[own])
-    amplitudes = [share * usual_force(setting, axis) for share in AMPLITUDE_SHARES]
+    amplitudes = [share * typical_force(setting, axis) for share in AMPLITUDE_SHARES]
     to_knots = at_knots(times, found.unknown.time)
     return refined(choose(shapes, data, to_knots, axis, amplitudes), shapes, data, to_knots, amplitudes)
 

@@ -30,7 +30,7 @@ from subzero.diagnosis.inference.latent_force import (
     force_columns,
     history,
     knots_of,
-    usual_force,
+    typical_force,
     with_force,
 )
 from subzero.diagnosis.inference.linear_gaussian import (
@@ -87,7 +87,7 @@ class LatentForceCandidate:
     knots: Knots
     terms: Mapping[str, Terms]
 
-    def made_white(self, before: Problem, after: Problem) -> LatentForceCandidate:
+    def whitened_anew(self, before: Problem, after: Problem) -> LatentForceCandidate:
         """Return what the noise of a problem has made white, made white by that of another."""
         fit, columns = rewhitened(self.fit, before, after), whitened_again(before, after, self.columns)
         return replace(self, fit=fit, columns=columns)
@@ -172,7 +172,7 @@ def _amplitudes(problem: Problem, name: str) -> list[float]:
 
 def amplitude_grid(setting: Setting, axis: str) -> list[float]:
     """Return the amplitudes that are mixed. [N, N m]"""
-    return [share * usual_force(setting, axis) for share in AMPLITUDE_SHARES]
+    return [share * typical_force(setting, axis) for share in AMPLITUDE_SHARES]
 
 
 CORRELATION_TIMES_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
@@ -232,7 +232,7 @@ def estimate_force(
     D = fit.D if D is None else D
     knots = knots_of(problem, spacing)
     C = force_columns(problem, fit.z, (axis,), knots)[axis]
-    L = _best_modes(_seen(fit, D, C), knots, usual_force(problem.records[0].setting, axis))
+    L = _best_modes(_seen(fit, D, C), knots, typical_force(problem.records[0].setting, axis))
     more = with_force(problem, axis, knots, L, 1.0)
     whole, J = np.concatenate([D, np.ones(L.shape[1])]), np.hstack([fit.J, C @ L])
     start = _linear(fit, J, whole)
@@ -348,7 +348,7 @@ def relinearised_force(
         done = found.fit
     else:
         found = estimate_drift(problem, start, which, MAX_DRIFT_LEVELS * SPECS[which].noise, D)
-        knots, done = found.knots, fit_beside_drift(problem, found, D)
+        knots, done = found.knots, fit_with_drift(problem, found, D)
     fit = _without(found, done, D.size)
     ((log, what),) = linear_candidates(problem, fit, {name: found.columns}, knots, terms, [kappa])
     point = LinearisationPoint(fit=fit, along=BaseRun(found.problem, done.z))
@@ -381,7 +381,7 @@ def linear_candidates(
     ]
 
 
-def fit_beside_drift(problem: Problem, found: EstimatedForce, D: np.ndarray) -> Fit:
+def fit_with_drift(problem: Problem, found: EstimatedForce, D: np.ndarray) -> Fit:
     """Return the fit of the records without a drift, under prior variances D (k,)."""
     start, channel, records = found.fit, found.unknown.axis, []
     for i, record in enumerate(problem.records):

@@ -88,7 +88,7 @@ def knots_of(problem: Problem, spacing: float = COARSE_SPACING_S) -> Knots:
     return Knots(record, np.concatenate(times), spacing)
 
 
-def usual_force(setting: Setting, axis: str) -> float:
+def typical_force(setting: Setting, axis: str) -> float:
     """Return the size of a usual force on an axis: the hull's drag at 1 m/s; a moment by a lever. [N, N m]"""
     drag = setting.model.vehicle.numbers().axial_drag
     lever = {"K": 0.02, "M": 0.1, "N": 0.1}.get(axis, 1.0)
@@ -147,7 +147,7 @@ def force_columns(
     """
     axes, more, eye = list(axes), problem.roughly(z), np.eye(knots.time.size)
     for axis in axes:
-        more = with_force(more, axis, knots, eye, 0.5 * usual_force(problem.records[0].setting, axis))
+        more = with_force(more, axis, knots, eye, 0.5 * typical_force(problem.records[0].setting, axis))
     there = np.concatenate([z, np.zeros(len(axes) * knots.time.size)])
     J = more.jacobian(there, range(z.size, there.size))[:, z.size :]
     return dict(zip(axes, np.split(J, len(axes), axis=1), strict=True))
@@ -206,10 +206,10 @@ def factors_along(setting: Setting, times: np.ndarray) -> np.ndarray:
     rows = track[np.searchsorted(grid, times + 1e-9, side="right") - 1]
     commands = setting.trial.commands
     assert commands is not None
-    told = commands.at(times)
+    reported = commands.at(times)
     found, numbers = np.zeros((times.size, len(FACTORS))), setting.model.vehicle.numbers()
     R, nu_r = np.zeros((3, 3)), np.zeros(6)
-    for out, row, command, time in zip(found, rows, told, times, strict=True):
+    for out, row, command, time in zip(found, rows, reported, times, strict=True):
         state = np.ascontiguousarray(row[: vehicle.STATE_SIZE])
         rotation(state[3:7], R)
         relative_velocity(state, R, np.ascontiguousarray(row[WATER : WATER + 3]), nu_r)

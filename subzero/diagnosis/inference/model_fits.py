@@ -5,7 +5,7 @@ with a Jacobian of its own, and rivals from where the others are. `Fits.sharpen`
 best fit, and takes from the records what economical steps get wrong there, where that is seen.
 
 One noise for all favours what it was found behind: what is slow in a record is noise to one explanation, and motion to
-another. So each has, in the end, the noise θ that is the most probable beside it (`with_own_noise`), in the linear
+another. So each has, in the end, the noise θ that is the most probable beside it (`refit_noise`), in the linear
 problem around its fit, all channels at once:
 
     max_θ  −½ (rᵀ Σ⁻¹ r − bᵀ P⁻¹ b) − ½ log det (D P) − ½ log det Σ + log p(θ),    A = Jᵀ Σ⁻¹ J,  b = Jᵀ Σ⁻¹ r
@@ -25,8 +25,8 @@ from typing import TYPE_CHECKING, NamedTuple, TypeVar
 import numpy as np
 
 from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, is_flat, variances
-from subzero.diagnosis.hypothesis.noise import Noise, Usual, log_prior_of
-from subzero.diagnosis.hypothesis.noise_estimate import Behind, estimate
+from subzero.diagnosis.hypothesis.noise import Noise, SensorPrior, log_prior_of
+from subzero.diagnosis.hypothesis.noise_estimate import ResidualNoise, estimate
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, Quadratic, posterior
 from subzero.diagnosis.inference.map_fit import Candidate, Fit, candidate_of, is_poor_fit, refit
@@ -35,7 +35,7 @@ from subzero.diagnosis.inference.posing import (
     sensor_of,
     whitened_again,
     with_finer_steps,
-    with_noise_behind,
+    with_residual_noise,
 )
 from subzero.diagnosis.inference.screening import Screening, screening_of
 
@@ -97,7 +97,7 @@ class Fits:
             wanted, self._in_parallel(partial(self._fitted, start=start), wanted), strict=True
         ):
             if words:
-                self._say(0.3, words, ids)
+                self._report_progress(0.3, words, ids)
             self._take(found)
 
     def _take(self, found: Candidate) -> None:
@@ -137,7 +137,7 @@ class Fits:
             behind = 0.0 if self.problem.kept.asked > runs else hopeless
             if len(done) >= 2 and now.optimistic_log_posterior < max(done) - behind:
                 return
-            self._say(0.5, "fitting again", now.ids)
+            self._report_progress(0.5, "fitting again", now.ids)
             self._again(now)
 
     def cross(self) -> None:
@@ -222,7 +222,7 @@ class Fits:
         """Return what is made of each of several, side by side: the runs of one fit come one after the other."""
         return self.side.map(make, several)
 
-    def _say(self, share: float, words: str, ids: Ids, more: str = "") -> None:
+    def _report_progress(self, share: float, words: str, ids: Ids, more: str = "") -> None:
         self.progress(share, f"{words} {' + '.join(ids) or 'nothing wrong'}{more}")
 
     def sharpen(self) -> None:
@@ -246,7 +246,7 @@ class Fits:
         """
         D, fit = variances(self.problem.entries, best.ids, best.kappa), best.fit
         near = fit.moved(self.problem) < settings.JACOBIAN_HOLDS_TOLERANCES
-        found = with_noise_behind(
+        found = with_residual_noise(
             self.economical, fit.z, D, fit.J if near else self.economical.jacobian(fit.z)
         )
         if found is None:
@@ -309,7 +309,7 @@ def gained_by_noise(before: Problem, after: Problem) -> float:
     )
 
 
-class WithOwnNoise(NamedTuple):
+class WithRefittedNoise(NamedTuple):
     """A hypothesis with the noise behind it: the problem with that, the hypothesis as it is fitted then, and as it was
     fitted before, with the evidence that it has now.
     """
@@ -319,32 +319,32 @@ class WithOwnNoise(NamedTuple):
     before: Candidate
 
 
-def candidate_with_own_noise(problem: Problem, candidate: Candidate) -> WithOwnNoise:
+def with_refitted_noise(problem: Problem, candidate: Candidate) -> WithRefittedNoise:
     """Return a hypothesis with the noise that is the most probable one behind it, which may ask for another κ."""
-    fit, found = candidate.fit, list[WithOwnNoise]()
+    fit, found = candidate.fit, list[WithRefittedNoise]()
     for kappa in sorted({candidate.kappa, min(KAPPAS)}):
         D = variances(problem.entries, candidate.ids, kappa)
-        more = with_own_noise(problem, Linear(fit.r + fit.J @ fit.z, fit.J), D)
+        more = refit_noise(problem, Linear(fit.r + fit.J @ fit.z, fit.J), D)
         J = whitened_again(problem, more, fit.J)
         new = candidate_of(more, candidate.ids, refit(more, fit.z, J, D, most_fresh=0, made_at=fit.made_at))
         gain = gained_by_noise(problem, more)
         log = {each: value + gain for each, value in new.log_evidence.items()}
         again = replace(new, log_evidence=log, log_posterior=new.log_posterior + gain)
-        found.append(WithOwnNoise(more, again, replace(again, fit=fit)))
+        found.append(WithRefittedNoise(more, again, replace(again, fit=fit)))
     return max(found, key=lambda each: each.again.log_posterior)
 
 
-def gain_of_own_noise(problem: Problem, linear: Linear, D: np.ndarray) -> float:
+def gain_of_refitted_noise(problem: Problem, linear: Linear, D: np.ndarray) -> float:
     """Return what the log evidence of the linear problem around an explanation gains with the noise that is the most
     probable beside it; D are the prior variances of its parameters (k,).
     """
-    more = with_own_noise(problem, linear, D)
+    more = refit_noise(problem, linear, D)
     again = Linear(*(whitened_again(problem, more, candidate) for candidate in linear))
     before, after = (posterior(candidate.quadratic, D).log_evidence for candidate in (linear, again))
     return after - before + gained_by_noise(problem, more)
 
 
-def with_own_noise(problem: Problem, linear: Linear, D: np.ndarray) -> Problem:
+def refit_noise(problem: Problem, linear: Linear, D: np.ndarray) -> Problem:
     """Return the problem with the noise that is the most probable one beside an explanation.
 
     Args:
@@ -352,7 +352,7 @@ def with_own_noise(problem: Problem, linear: Linear, D: np.ndarray) -> Problem:
         linear: around the fit of the explanation.
         D: prior variances of its parameters (k,).
     """
-    new = iter(_with_noise_behind(_channels(problem, linear), D))
+    new = iter(_with_residual_noise(_channels(problem, linear), D))
     records = [
         replace(
             record,
@@ -379,7 +379,7 @@ def log_evidence_of(
     for record, some in zip(problem.records, kept, strict=True):
         masks += [some[name][noise.used] for name, noise in record.noise.items()]
     some_of_each = [channel.only(mask) for channel, mask in zip(channels, masks, strict=True)]
-    return _log_evidence(_with_noise_behind(some_of_each, D), D)
+    return _log_evidence(_with_residual_noise(some_of_each, D), D)
 
 
 @dataclass(frozen=True, eq=False)
@@ -393,7 +393,7 @@ class _Channel:
         J: sensitivities (m, k).
     """
 
-    usual: Usual
+    usual: SensorPrior
     noise: Noise
     whole: np.ndarray
     J: np.ndarray
@@ -415,12 +415,12 @@ class _Channel:
         half = np.linalg.cholesky(np.diag(1.0 / D) + others.A)
         apart = np.linalg.solve(half, np.column_stack([self.J.T, others.b]))
         slopes, mean = apart[:, :-1].T, np.linalg.solve(half.T, apart[:, -1])
-        behind = Behind(residual=self.whole - self.J @ mean, J=slopes, D=np.ones(D.size))
+        behind = ResidualNoise(residual=self.whole - self.J @ mean, J=slopes, D=np.ones(D.size))
         found = estimate(self.noise.time, behind, self.usual, self.noise)
         return replace(self, noise=found)
 
 
-def _with_noise_behind(channels: list[_Channel], D: np.ndarray) -> list[_Channel]:
+def _with_residual_noise(channels: list[_Channel], D: np.ndarray) -> list[_Channel]:
     """Return channels with their most probable noise, beside parameters of prior variances D (k,)."""
     now = _log_evidence(channels, D)
     for _ in range(settings.MAX_TRIED):

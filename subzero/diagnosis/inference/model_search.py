@@ -64,11 +64,11 @@ class Search(Fits):
             if best.ids in looked:
                 return
             looked.add(best.ids)
-            self._say(0.7, "a further cause beside", best.ids)
+            self._report_progress(0.7, "a further cause beside", best.ids)
             self.fit_all(self._more(best) if len(best.ids) < MAX_CAUSES else [], best.fit)
             for without in best.ids:
                 self._without(best, without)
-            self._beside_others(best)
+            self._compare_with_others(best)
             self._of_real_size(best)
             self.refine(settings.MAX_ADDED, settings.CLOSE_NATS)
             self.cross()
@@ -89,7 +89,7 @@ class Search(Fits):
         found = self._unknown(with_one_swapped(self.problem, best, rest))
         self.fit_all(sorted(found, key=lambda ids: -found[ids])[: settings.MAX_TRIED], best.fit)
 
-    def _beside_others(self, best: Candidate) -> None:
+    def _compare_with_others(self, best: Candidate) -> None:
         """Fit what comes out best beside the other candidates, if the linear problem there has it before the best: a
         right pair may be far from a wrong cause that is as good as any by itself.
         """
@@ -175,7 +175,7 @@ class Search(Fits):
         """Take the wide fit for that of "nothing is wrong", before anything else is known."""
         self._take(candidate_of(self.problem, (), self.wide))
 
-    def go_near(self, fit: Fit) -> None:
+    def relinearise_at(self, fit: Fit) -> None:
         """Make everything around a linear problem that is closer to the records than that of the wide fit."""
         self.wide, self.is_far = fit, False
 
@@ -185,17 +185,17 @@ class Search(Fits):
         fit = refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=1, made_at=z)
         self._take(candidate_of(self.problem, other.ids, fit))
 
-    def look(self) -> None:
+    def screen_causes(self) -> None:
         """Fill the screen: linear evidence of nothing, every cause, and every pair."""
         self.screen = screening_of(self.problem, self.wide, self.nominal, far=self.is_far)
 
     def first_fits(self) -> None:
         """Fit nothing, and the best causes and pairs of the screen, with real runs and the sensitivities at hand."""
         if self.screen.far:
-            self.fit_from_afar()
+            self.fit_large_effects()
         first = [] if self.screen.far else self._first()
         for ids, fit in zip(first, self._in_parallel(self._alone, first), strict=True):
-            self._say(0.3, "fitting", ids, " by itself")
+            self._report_progress(0.3, "fitting", ids, " by itself")
             self._keep(ids, fit)
         best = (
             self.screen.best(1, settings.MAX_RANKED, settings.LINEAR_NATS),
@@ -214,10 +214,10 @@ class Search(Fits):
         swept = swept_from_nominal(self.problem, *self.nominal)
         least = -np.inf if self.is_poor() else self.best().log_posterior
         for ids in _best_of(self._unknown(swept.log_posterior), least):
-            self._say(0.4, "fitting", ids, " by itself")
+            self._report_progress(0.4, "fitting", ids, " by itself")
             self._take(candidate_of(self.problem, ids, self._alone(ids, swept.starts[ids])))
 
-    def fit_from_afar(self) -> None:
+    def fit_large_effects(self) -> None:
         """Fit the best causes of the screen by themselves, the best first; if one explains the records, within declared
         tolerances, none that real runs of some sizes have far behind it.
         """
@@ -226,7 +226,7 @@ class Search(Fits):
             if not self.is_poor() and self.screen.log_posterior[ids] < best - settings.DECISIVE_NATS:
                 return
             if ids not in self.candidates:
-                self._say(0.3, "fitting", ids, " by itself")
+                self._report_progress(0.3, "fitting", ids, " by itself")
                 self._keep(ids, self._alone(ids))
 
     def set_aside(self) -> dict[Ids, Candidate]:
@@ -254,7 +254,7 @@ class Search(Fits):
         """Fit the best candidate again until it has settled, so that its numbers can be told, and what might still
         catch up with it; then its rivals from where it is.
         """
-        self._once_more()
+        self._restart_best()
         stuck: set[Ids] = set()
         for _ in range(settings.MAX_TRIED):
             best = self.best()
@@ -263,7 +263,7 @@ class Search(Fits):
             ]:
                 if each.ids in stuck:
                     continue
-                self._say(0.75, "settling", each.ids)
+                self._report_progress(0.75, "settling", each.ids)
                 self._again(each)
                 if (
                     self.candidates[each.ids].log_posterior
@@ -273,12 +273,12 @@ class Search(Fits):
         self.cross()
         self._nothing()
 
-    def _once_more(self) -> None:
+    def _restart_best(self) -> None:
         """Fit the first candidates from off their kinks, if they are close to the best and were not so begun before."""
         for ids in self._ranked()[: settings.MAX_TRIED]:
             close = self.candidates[ids].log_posterior > self.best().log_posterior - settings.HOPELESS_NATS
             if close and ids not in self.restarted:
-                self._say(0.75, "once more", ids)
+                self._report_progress(0.75, "once more", ids)
                 self.restart(self.candidates[ids])
 
     def _is_open(self, candidate: Candidate, best: Candidate) -> bool:

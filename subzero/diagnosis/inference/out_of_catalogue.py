@@ -43,10 +43,10 @@ from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Linear, Terms, l
 from subzero.diagnosis.inference.map_fit import is_poor_fit, refit
 from subzero.diagnosis.inference.model_average import FURTHER_CAUSE_ODDS, occam_folded
 from subzero.diagnosis.inference.model_fits import (
-    WithOwnNoise,
-    candidate_with_own_noise,
+    WithRefittedNoise,
     gained_by_noise,
-    with_own_noise,
+    refit_noise,
+    with_refitted_noise,
 )
 from subzero.diagnosis.inference.posing import whitened_again
 from subzero.external_force import AXES
@@ -216,11 +216,11 @@ def _around_themselves(
     terms = one_terms(problem, best.fit.z, finer)
     look = partial(relinearised_force, problem, best.fit, kappa=1.0, knots=finer, terms=terms)
     return sorted(
-        search.side.map(look, _worth_a_look(predicted, best)), key=lambda candidate: -candidate.log_posterior
+        search.side.map(look, _promising(predicted, best)), key=lambda candidate: -candidate.log_posterior
     )
 
 
-def _worth_a_look(predicted: dict[str, float], best: Candidate) -> list[str]:
+def _promising(predicted: dict[str, float], best: Candidate) -> list[str]:
     """Return the forces and drifts that are looked at around their own fits, of hoped-for log posteriors."""
     ranked = sorted(predicted, key=lambda name: -predicted[name])[: settings.MAX_TRIED]
     least = max(best.log_posterior - settings.FAR_NATS, predicted[ranked[0]] - settings.LINEAR_NATS)
@@ -315,14 +315,14 @@ def shares(
     return {ids: kept * p for ids, p in inside.items()}, occam_folded(found)
 
 
-def each_with_own_noise(search: Search, outside: Sequence[OutOfCatalogue]) -> list[OutOfCatalogue]:
+def each_with_refitted_noise(search: Search, outside: Sequence[OutOfCatalogue]) -> list[OutOfCatalogue]:
     """Give every explanation that may be the most probable the evidence that it has with the noise behind it:
     hypotheses in the search, and what lies outside, which is returned, most probable first.
 
     "Nothing is wrong" leaves most to noise, and gains most: nothing that is farther behind than that gains is asked.
     """
     fits, first = search.candidates, max(search.best().log_posterior, _most(outside))
-    own = partial(candidate_with_own_noise, search.problem)
+    own = partial(with_refitted_noise, search.problem)
     nothing = own(fits[()])
     none = nothing.before
     gained = max(none.log_posterior - fits[()].log_posterior, 0.0)
@@ -337,8 +337,8 @@ def each_with_own_noise(search: Search, outside: Sequence[OutOfCatalogue]) -> li
         for candidate in outside[: settings.MAX_RANKED]
         if candidate.log_posterior > least and (candidate.point or not _is_force(candidate))
     ]
-    found = search.side.map(partial(_with_own_noise, search.problem, nothing.problem), few)
-    forces = search.side.map(partial(_beside_nothing, search.problem, nothing), filter(_is_force, outside))
+    found = search.side.map(partial(_with_refitted_noise, search.problem, nothing.problem), few)
+    forces = search.side.map(partial(_against_nothing, search.problem, nothing), filter(_is_force, outside))
     return _sorted(
         [*found, *forces],
         [candidate for candidate in outside if candidate not in few and not _is_force(candidate)],
@@ -350,27 +350,28 @@ def _is_force(candidate: OutOfCatalogue) -> bool:
     return isinstance(candidate.what, LatentForceCandidate) and not candidate.causes
 
 
-def _with_own_noise(problem: Problem, behind: Problem, candidate: OutOfCatalogue) -> OutOfCatalogue:
+def _with_refitted_noise(problem: Problem, behind: Problem, candidate: OutOfCatalogue) -> OutOfCatalogue:
     """Return what lies outside with the evidence that it has with the noise beside it; `behind` is the problem with
     that behind "nothing is wrong".
     """
     if isinstance(candidate.what, FittedChangePoint):
         return replace(
-            candidate, log_posterior=candidate.log_posterior + _gain_of_own_noise(problem, candidate.what)
+            candidate,
+            log_posterior=candidate.log_posterior + _gain_of_refitted_noise(problem, candidate.what),
         )
     log = (
         candidate.log_posterior
         - candidate.what.log_evidence(problem, candidate.causes)
         + gained_by_noise(problem, behind)
     )
-    return _beside_noise(candidate, candidate.what.made_white(problem, behind), log, behind)
+    return _against_noise(candidate, candidate.what.whitened_anew(problem, behind), log, behind)
 
 
-def _gain_of_own_noise(problem: Problem, fitted: FittedChangePoint) -> float:
+def _gain_of_refitted_noise(problem: Problem, fitted: FittedChangePoint) -> float:
     """Return what the log evidence of a sudden cause gains with the noise that is the most probable beside it, fitted
     again with that: no linear problem knows that a fin cannot lose more than all of its command.
     """
-    own = with_own_noise(problem, *fitted.linear(problem))
+    own = refit_noise(problem, *fitted.linear(problem))
     more, fit = replace(fitted.problem, records=own.records), fitted.fit
     J = whitened_again(problem, own, fit.J)
     again = refit(more, fit.z, J, fit.D, most_fresh=0, made_at=fit.made_at)
@@ -378,16 +379,18 @@ def _gain_of_own_noise(problem: Problem, fitted: FittedChangePoint) -> float:
     return found.log_posterior - fitted.log_posterior + gained_by_noise(problem, own)
 
 
-def _beside_nothing(problem: Problem, nothing: WithOwnNoise, candidate: OutOfCatalogue) -> OutOfCatalogue:
+def _against_nothing(
+    problem: Problem, nothing: WithRefittedNoise, candidate: OutOfCatalogue
+) -> OutOfCatalogue:
     """Return a force or a drift likewise, around "nothing is wrong" as it is fitted with the noise behind it."""
     assert isinstance(candidate.what, LatentForceCandidate)
     own, none = nothing.problem, nothing.again
-    what = replace(candidate.what.made_white(problem, own), fit=none.fit, kappa=none.kappa)
+    what = replace(candidate.what.whitened_anew(problem, own), fit=none.fit, kappa=none.kappa)
     without = posterior(none.fit.quadratic, variances(own.entries, (), none.kappa)).log_evidence
-    return _beside_noise(candidate, what, none.log_posterior + _log_prior(own) - without, own)
+    return _against_noise(candidate, what, none.log_posterior + _log_prior(own) - without, own)
 
 
-def _beside_noise(
+def _against_noise(
     candidate: OutOfCatalogue, what: LatentForceCandidate, log: float, behind: Problem
 ) -> OutOfCatalogue:
     """Return a force or a drift with the noise behind nothing, or with that beside all that it might do: behind nothing
@@ -401,19 +404,19 @@ def _beside_noise(
     """
 
     def log_posterior(own: Problem) -> float:
-        evidence = what.made_white(behind, own).log_evidence(own, candidate.causes)
+        evidence = what.whitened_anew(behind, own).log_evidence(own, candidate.causes)
         return log + evidence + gained_by_noise(behind, own)
 
     tried = [(log_posterior(behind), behind)]
     linear, D = what.linear_at_most(behind, candidate.causes)
     for _ in range(settings.MAX_TRIED):
-        own = with_own_noise(tried[-1][1], linear, D)
+        own = refit_noise(tried[-1][1], linear, D)
         tried.append((log_posterior(own), own))
         if tried[-1][0] < tried[-2][0] + settings.NEGLIGIBLE_GAIN_NATS:
             break
-        linear, D = what.made_white(behind, own).linear(own, candidate.causes)
+        linear, D = what.whitened_anew(behind, own).linear(own, candidate.causes)
     best, own = max(tried, key=lambda each: each[0])
-    return replace(candidate, what=what.made_white(behind, own), log_posterior=best, own=own)
+    return replace(candidate, what=what.whitened_anew(behind, own), log_posterior=best, own=own)
 
 
 def linear_of_first(search: Search, outside: Sequence[OutOfCatalogue]) -> tuple[Linear, np.ndarray]:

@@ -20,8 +20,15 @@ from subzero.channels import HEADING
 from subzero.diagnosis.hypothesis.catalogue import ONSETS, SAMPLED, START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import CLOCK, SPECS
 from subzero.diagnosis.hypothesis.hypotheses import entries_of, moves_nothing, with_tolerances
-from subzero.diagnosis.hypothesis.noise import Noise, Usual, spikes, times_beside, usual_noise, usual_of
-from subzero.diagnosis.hypothesis.noise_estimate import Behind, estimate
+from subzero.diagnosis.hypothesis.noise import (
+    Noise,
+    SensorPrior,
+    correlation_times_of,
+    prior_noise,
+    sensor_prior,
+    spikes,
+)
+from subzero.diagnosis.hypothesis.noise_estimate import ResidualNoise, estimate
 from subzero.diagnosis.inference import settings
 from subzero.diagnosis.inference.map_fit import Fit, bounded_step, bounds, objective
 from subzero.diagnosis.inference.problem import Observed, Problem
@@ -122,7 +129,9 @@ def _observed(trial: Logged) -> Observed:
     if HEADING in values:
         values[HEADING] = turned(values[HEADING], simulated[HEADING])
     noise = {
-        name: _usual(time, column, column - simulated[name], usual_of(name, column, trial.noise, trial.steps))
+        name: _usual(
+            time, column, column - simulated[name], sensor_prior(name, column, trial.noise, trial.steps)
+        )
         for name, column in values.items()
     }
     return Observed(
@@ -130,19 +139,19 @@ def _observed(trial: Logged) -> Observed:
     )
 
 
-def _usual(time: np.ndarray, values: np.ndarray, difference: np.ndarray, usual: Usual) -> Noise:
+def _usual(time: np.ndarray, values: np.ndarray, difference: np.ndarray, usual: SensorPrior) -> Noise:
     """Return a usual sensor's noise, without the samples that lie far off in measured − simulated (n,)."""
-    return usual_noise(time, _used(values, difference, usual), usual)
+    return prior_noise(time, _used(values, difference, usual), usual)
 
 
-def _used(values: np.ndarray, difference: np.ndarray, usual: Usual) -> np.ndarray:
+def _used(values: np.ndarray, difference: np.ndarray, usual: SensorPrior) -> np.ndarray:
     """Return which samples are measured, and no outliers (n,)."""
     used = np.isfinite(values)
     used[used] = ~spikes(difference[used], max(usual.level, usual.resolution))
     return used
 
 
-def with_noise_behind(
+def with_residual_noise(
     problem: Problem, z: np.ndarray, D: np.ndarray, white: np.ndarray | None = None
 ) -> Problem | None:
     """Return the problem with the noise that is left behind deviations z; None if that is as good as known.
@@ -163,9 +172,9 @@ def with_noise_behind(
         noise = {}
         for name, old in record.noise.items():
             own = slice(at, at + old.count)
-            noise[name] = _behind(record, name, Behind(residual=rest[own], J=J[own], D=D))
+            noise[name] = _behind(record, name, ResidualNoise(residual=rest[own], J=J[own], D=D))
             at += old.count
-        found.append(replace(record, noise=noise, noise_times=times_beside(noise)))
+        found.append(replace(record, noise=noise, noise_times=correlation_times_of(noise)))
     if all(
         _alike(each.noise[name], new.noise[name])
         for each, new in zip(problem.records, found, strict=True)
@@ -209,10 +218,10 @@ def _without_outliers(problem: Problem, record: int, z: np.ndarray) -> Observed:
     return replace(found, noise=noise)
 
 
-def sensor_of(record: Observed, name: str) -> Usual:
+def sensor_of(record: Observed, name: str) -> SensorPrior:
     """Return what the sensor of a channel is like, by what is known of it and by the record as it was posed."""
     level, resolution = record.known.get(name, SPECS[name].noise), record.noise[name].resolution
-    return Usual(level, resolution, name in record.known, record.noise_times.get(name))
+    return SensorPrior(level, resolution, name in record.known, record.noise_times.get(name))
 
 
 def _unit(record: Observed) -> dict[str, Noise]:
@@ -220,7 +229,7 @@ def _unit(record: Observed) -> dict[str, Noise]:
     return {name: Noise(white=1.0, used=noise.used, time=noise.time) for name, noise in record.noise.items()}
 
 
-def _behind(record: Observed, name: str, behind: Behind) -> Noise:
+def _behind(record: Observed, name: str, behind: ResidualNoise) -> Noise:
     """Return the noise of a channel behind a fit."""
     old = record.noise[name]
     return replace(estimate(old.time, behind, sensor_of(record, name)), used=old.used)

@@ -18,7 +18,7 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.configuration import sensed, truth
 from subzero.diagnosis.hypothesis.hypotheses import Entry, grouped
-from subzero.diagnosis.hypothesis.noise import Noise, TimesBeside, innovations_of_each
+from subzero.diagnosis.hypothesis.noise import CorrelationTimes, Noise, innovations_of_each
 from subzero.diagnosis.inference.simulator import (
     RunCache,
     Stop,
@@ -67,7 +67,7 @@ class Observed:
     setting: Setting
     known: Mapping[str, float] = field(default_factory=dict)
     correction: Mapping[str, np.ndarray] = field(default_factory=dict)
-    noise_times: Mapping[str, TimesBeside] = field(default_factory=dict)
+    noise_times: Mapping[str, CorrelationTimes] = field(default_factory=dict)
 
     def corrected(self, more: Mapping[str, np.ndarray]) -> Observed:
         """Return the record beside a simulation to which more is added; what was measured stays as it is."""
@@ -200,8 +200,8 @@ class Problem:
         ]
         stops = [self._stops(i, z, wanted) for i in range(len(self.records))]
         early = [(k, i, moved) for k, i, moved in jobs if not self._late(k)]
-        begun = [stops[i].get(self.entries[k].parameter.begins) for k, i, _ in early]
-        runs = iter(self.tracks([(i, moved) for _, i, moved in early], begun))
+        started = [stops[i].get(self.entries[k].parameter.begins) for k, i, _ in early]
+        runs = iter(self.tracks([(i, moved) for _, i, moved in early], started))
         J = np.zeros((sum(part.size for part in shown), len(self.entries)))
         first = np.cumsum([0, *(part.size for part in shown)])
         for k, i, moved in jobs:

@@ -36,7 +36,14 @@ from scipy.special import gammaln
 
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.hypothesis.noise import Noise, Usual, level_of, log_prior_of, resolution_of, usual_of
+from subzero.diagnosis.hypothesis.noise import (
+    Noise,
+    SensorPrior,
+    level_of,
+    log_prior_of,
+    resolution_of,
+    sensor_prior,
+)
 from subzero.diagnosis.inference.linear_gaussian import log_sum
 
 CLEAR_LOG_ODDS = 6.0
@@ -75,7 +82,7 @@ def repeated_values(logged: Logged, trusted: frozenset[str] = frozenset()) -> li
     found = []
     for name, values in logged.record.values.items():
         if name not in trusted:
-            usual = usual_of(name, values, logged.noise)
+            usual = sensor_prior(name, values, logged.noise)
             level = float(np.hypot(usual.level, usual.resolution / np.sqrt(12.0)))
             found += _of(name, logged.record.time, values, level)
     return found
@@ -87,13 +94,13 @@ def steps_off_grid(logged: Logged, trusted: frozenset[str] = frozenset()) -> lis
     """
     found = []
     for name, values in logged.record.values.items():
-        step = usual_of(name, values, logged.noise).resolution
+        step = sensor_prior(name, values, logged.noise).resolution
         known = np.flatnonzero(np.isfinite(values))
         if name in trusted or step == 0.0 or known.size < 2 * FEWEST_FROZEN:
             continue
-        beside = _beside_multiples((values[known] - values[known[0]]) / step)
+        beside = _off_grid((values[known] - values[known[0]]) / step)
         first = int(np.argmax(np.abs(beside) > OFF_GRID))
-        same = np.abs(_beside_multiples(beside[first:] - beside[first])) < OFF_GRID
+        same = np.abs(_off_grid(beside[first:] - beside[first])) < OFF_GRID
         if FEWEST_FROZEN <= first <= known.size - FEWEST_FROZEN and same.all():
             found.append(
                 DataError(
@@ -106,7 +113,7 @@ def steps_off_grid(logged: Logged, trusted: frozenset[str] = frozenset()) -> lis
     return found
 
 
-def _beside_multiples(values: np.ndarray) -> np.ndarray:
+def _off_grid(values: np.ndarray) -> np.ndarray:
     """Return by how much values are more than the nearest whole number (n,)."""
     return values - np.round(values)
 
@@ -256,7 +263,7 @@ class Steps(NamedTuple):
     time: np.ndarray
     low: np.ndarray
     high: np.ndarray
-    usual: Usual
+    usual: SensorPrior
 
 
 class _Belief(NamedTuple):
@@ -266,7 +273,7 @@ class _Belief(NamedTuple):
     variance: np.ndarray
 
 
-def steps_of(time: np.ndarray, deviations: np.ndarray, usual: Usual) -> Steps:
+def steps_of(time: np.ndarray, deviations: np.ndarray, usual: SensorPrior) -> Steps:
     """Return what the values of a rounded channel say.
 
     Args:
@@ -301,7 +308,7 @@ def log_evidence_up_to(steps: Steps) -> np.ndarray:
     for i, gap in enumerate(gaps.tolist()):
         kept = np.exp(-gap / lasts)
         x = _Belief(kept * x.mean, kept**2 * x.variance + (1.0 - kept**2) * slow)
-        inside, x_inside = _seen_between(x, white, float(steps.low[i]), float(steps.high[i]))
+        inside, x_inside = _within(x, white, float(steps.low[i]), float(steps.high[i]))
         inside = (1.0 - OUTLIERS) * inside
         log = log + np.log(inside + far)
         x = _mixed(x, x_inside, inside / (inside + far))
@@ -309,7 +316,7 @@ def log_evidence_up_to(steps: Steps) -> np.ndarray:
     return found
 
 
-def _noises(usual: Usual) -> Sequence[tuple[Noise, float]]:
+def _noises(usual: SensorPrior) -> Sequence[tuple[Noise, float]]:
     """Return the noises that are tried, each with its log prior."""
     own, nothing = usual._replace(resolution=0.0), np.zeros(0)  # rounding is none of it
     each = [
@@ -323,7 +330,7 @@ def _noises(usual: Usual) -> Sequence[tuple[Noise, float]]:
     return [(item, log - total) for item, log in zip(each, logs, strict=True)]
 
 
-def _seen_between(x: _Belief, white: np.ndarray, low: float, high: float) -> tuple[np.ndarray, _Belief]:
+def _within(x: _Belief, white: np.ndarray, low: float, high: float) -> tuple[np.ndarray, _Belief]:
     """Return how probable it is that x + w lies between two numbers (g,), and x if it does."""
     from scipy.special import ndtr
 

@@ -44,7 +44,7 @@ from subzero.diagnosis.inference.map_fit import (
     refit,
     restarted_where_smooth,
 )
-from subzero.diagnosis.inference.posing import with_noise_behind
+from subzero.diagnosis.inference.posing import with_residual_noise
 from subzero.diagnosis.inference.problem import SizeRun, sizes_run
 
 if TYPE_CHECKING:
@@ -343,7 +343,7 @@ def fit_wide(problem: Problem, progress: Progress) -> tuple[Problem, Fit, Nomina
     fit = _from(problem, zero, J, progress)
     for _ in range(settings.MAX_ADDED):
         D = variances(problem.entries, (), KAPPA_WIDE)
-        again = with_noise_behind(problem, fit.z, D) if np.isfinite(fit.r).all() else None
+        again = with_residual_noise(problem, fit.z, D) if np.isfinite(fit.r).all() else None
         if again is None:
             break
         problem, J = again, again.jacobian(zero)

@@ -33,7 +33,7 @@ from subzero.diagnosis.hypothesis.configuration import (
 )
 from subzero.engine import coupling
 from subzero.engine.coupling import FINE, exchange, hull_steps
-from subzero.engine.external_wrench import feel_current, row_at
+from subzero.engine.external_wrench import row_at, sample_current
 from subzero.engine.initial_conditions import go_on_with, most_hull_steps, prepare
 from subzero.engine.time_loop import NO_ROOM, SPARE
 from subzero.jit import compiled, inner
@@ -112,7 +112,7 @@ def work(live: Live) -> float:
 def _write(setup: Setup, live: Live, time: float, state: np.ndarray, out: np.ndarray) -> None:
     """Write a state and what else sensors see; tension and length as they are at the end of the exchange."""
     command, force = setup.orders.values[row_at(setup.orders.time, time)], live.now.force
-    feel_current(setup, state, time, live.now.hull)
+    sample_current(setup, state, time, live.now.hull)
     for j in range(STATE_SIZE):
         out[j] = state[j]
     for j in range(3):

@@ -148,7 +148,7 @@ def _sure(verdict: Verdict) -> Iterator[str]:
     if verdict.on_model == NOTHING_NEAR:
         yield "No probability says anything here: all are of explanations that do not fit."
     elif verdict.on_model in (NOTHING_WRONG, CALIBRATED):
-        yield from _not_seen(verdict)
+        yield from _undetectable(verdict)
     elif verdict.on_model != UNDECIDED:
         yield from _runner_up(verdict)
     for record in verdict.unstable:
@@ -165,8 +165,8 @@ def _probability(verdict: Verdict) -> float | None:
     if verdict.on_model == CAUSE_NAMED and verdict.causes:
         return min(cause.probability for cause in verdict.causes)
     if verdict.on_model in (OUTSIDE, NOTHING_WRONG):
-        told = [p for name, p in verdict.probabilities.items() if words.is_told(name, verdict)]
-        return sum(told) if told else None
+        reported = [p for name, p in verdict.probabilities.items() if words.is_reported(name, verdict)]
+        return sum(reported) if reported else None
     return None
 
 
@@ -175,7 +175,7 @@ def _in_words(probability: float) -> str:
     return next((said for least, said in SURE.items() if probability >= least), "Not sure")
 
 
-def _not_seen(verdict: Verdict) -> Iterator[str]:
+def _undetectable(verdict: Verdict) -> Iterator[str]:
     """Give what these records could not have shown, which "nothing is wrong" says nothing of."""
     rows = verdict.detectable
     hidden = [words.explanation(row.id) for row in rows if row.signal < SEEN_SIGNAL]
@@ -192,11 +192,11 @@ def _not_seen(verdict: Verdict) -> Iterator[str]:
 
 def _runner_up(verdict: Verdict) -> Iterator[str]:
     """Give what is most probable beside what is told, and how far it is where that is known."""
-    others = [name for name in verdict.probabilities if not words.is_told(name, verdict)]
+    others = [name for name in verdict.probabilities if not words.is_reported(name, verdict)]
     if not others:
         return
     first = max(others, key=lambda name: verdict.probabilities[name])
-    said, ids = words.beside_errors(first, verdict), words.without_errors(first, verdict)
+    said, ids = words.with_errors(first, verdict), words.without_errors(first, verdict)
     said = f"What comes next: {said} (probability {words.probability(verdict.probabilities[first])})"
     D = next(
         (rival.discrimination for rival in verdict.rivals if (" + ".join(rival.ids) or "none") == ids),

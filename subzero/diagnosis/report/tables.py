@@ -54,7 +54,7 @@ def detectable(verdict: Verdict | Sequence[Detectability], *, every: bool = Fals
                 _smallest(each),
                 explanation(each.rival, known) if each.rival else NOTHING,
                 f"{each.discrimination:.3g}",
-                _told(each),
+                _reported(each),
                 each.id,
             )
             for each in shown
@@ -74,7 +74,7 @@ def _smallest(detectability: Detectability) -> str:
     return "; ".join(sizes) or NOTHING
 
 
-def _told(detectability: Detectability) -> str:
+def _reported(detectability: Detectability) -> str:
     if detectability.signal < SEEN_SIGNAL:
         return "not seen"
     if detectability.discrimination < CONFUSED_BELOW:
@@ -127,7 +127,7 @@ def rivals(verdict: Verdict, *, short: bool = False) -> Table:
         ("explanation", "probability", "D", "parameters", "id"),
         [
             (
-                rival_words(rival),
+                rival_in_words(rival),
                 probability(rival.probability),
                 number(rival.discrimination),
                 _numbers(rival),
@@ -139,7 +139,7 @@ def rivals(verdict: Verdict, *, short: bool = False) -> Table:
 
 
 def _short(rival: Rival) -> tuple[str, ...]:
-    return rival_words(rival), probability(rival.probability), number(rival.discrimination)
+    return rival_in_words(rival), probability(rival.probability), number(rival.discrimination)
 
 
 def _worth(found: Sequence[Rival]) -> Sequence[Rival]:
@@ -147,7 +147,7 @@ def _worth(found: Sequence[Rival]) -> Sequence[Rival]:
     return [each for each in found if each.probability >= WORTH_A_LINE] or found[:1]
 
 
-def rival_words(rival: Rival) -> str:
+def rival_in_words(rival: Rival) -> str:
     """Return a rival in words; a force or a drift as everybody understands it."""
     return explanation(_id(rival), {_id(rival): rival.sentence} if ":" not in _id(rival) else {})
 

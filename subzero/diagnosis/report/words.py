@@ -131,11 +131,11 @@ def explanation(name: str, known: Mapping[str, str] | None = None) -> str:
 
 def without_errors(name: str, verdict: Verdict) -> str:
     """Return a hypothesis without the errors in the data that are told."""
-    told = {error.id for error in verdict.data_errors} if verdict.then else set()
-    return " + ".join(each for each in name.split(" + ") if each not in told) or "none"
+    reported = {error.id for error in verdict.data_errors} if verdict.then else set()
+    return " + ".join(each for each in name.split(" + ") if each not in reported) or "none"
 
 
-def beside_errors(name: str, verdict: Verdict) -> str:
+def with_errors(name: str, verdict: Verdict) -> str:
     """Return a hypothesis in words, without the errors in the data that are told."""
     rest = without_errors(name, verdict)
     if rest == "none" and name != "none":
@@ -169,13 +169,13 @@ def _spaced(name: str) -> str:
 
 def sentences(verdict: Verdict) -> dict[str, str]:
     """Return what a verdict itself says of its causes and rivals: hypothesis → sentence."""
-    told = {" + ".join(rival.ids) or "none": rival.sentence for rival in verdict.rivals}
-    told = {name: said for name, said in told.items() if not name.startswith(FORCE)}
-    told |= {each.id: each.sentence for each in verdict.causes if each.start_time is None}
-    told |= {error.id: error.sentence for error in verdict.data_errors}
+    reported = {" + ".join(rival.ids) or "none": rival.sentence for rival in verdict.rivals}
+    reported = {name: said for name, said in reported.items() if not name.startswith(FORCE)}
+    reported |= {each.id: each.sentence for each in verdict.causes if each.start_time is None}
+    reported |= {error.id: error.sentence for error in verdict.data_errors}
     if verdict.unknown is not None and not verdict.unknown.is_drift:
-        told[f"{FORCE}{verdict.unknown.axis}"] = something(verdict.unknown.axis, verdict.unknown.force)
-    return told
+        reported[f"{FORCE}{verdict.unknown.axis}"] = something(verdict.unknown.axis, verdict.unknown.force)
+    return reported
 
 
 def probability(value: float) -> str:
@@ -195,7 +195,7 @@ def headline(verdict: Verdict) -> str:
     return named if verdict.complete else f"{named} (interrupted: this is as far as it came)"
 
 
-def is_told(name: str, verdict: Verdict) -> bool:
+def is_reported(name: str, verdict: Verdict) -> bool:
     """Say whether a hypothesis is what the verdict tells: its causes, whenever they began, or its force or drift."""
     parts = [error for error in without_errors(name, verdict).split(" + ") if error != "none"]
     if verdict.on_model == UNDECIDED:
@@ -295,11 +295,11 @@ def unknown(unknown: Unknown) -> str:
 
 def _other_features(unknown: Unknown) -> str:
     """Return what may be in the formula instead, in words; empty if nothing is as probable as that."""
-    told = {feature for _, feature, *_ in unknown.formula}
+    reported = {feature for _, feature, *_ in unknown.formula}
     others = [
         f"{name} ({_described(name)}; probability {p:.2f})"
         for name, p in unknown.features.items()
-        if name not in told and p >= ALTERNATIVE_PROBABILITY
+        if name not in reported and p >= ALTERNATIVE_PROBABILITY
     ]
     return f" What is not ruled out: {', '.join(others)}." if others else ""
 

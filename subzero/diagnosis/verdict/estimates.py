@@ -24,7 +24,7 @@ from subzero.diagnosis.inference.input_estimation import (
     LatentForceCandidate,
     estimate_drift,
     estimate_force,
-    fit_beside_drift,
+    fit_with_drift,
 )
 from subzero.diagnosis.inference.latent_force import AXIS_WORDS, DRIFT, FORCE, MAX_DRIFT_LEVELS, samples_of
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, log_sum, posterior
@@ -145,15 +145,15 @@ def rivals(
     best: Candidate,
     inside: Mapping[Ids, float],
     left: Sequence[Ids],
-    told: Ids | None,
+    reported: Ids | None,
     most: int = 8,
 ) -> tuple[Rival, ...]:
     """Return the hypotheses that are left beside the one that is told, if one is, at most so many; or else the
     runner-up.
     """
-    listed = [ids for ids in left if ids != told][:most]
+    listed = [ids for ids in left if ids != reported][:most]
     ranked: Sequence[Ids] = sorted(inside, key=lambda ids: -inside[ids])
-    listed = listed or [ids for ids in ranked if ids != told][:1]
+    listed = listed or [ids for ids in ranked if ids != reported][:1]
     return tuple(_rival(work, best, ids, inside.get(ids, 0.0)) for ids in listed)
 
 
@@ -352,7 +352,7 @@ def _estimated(work: Findings, explanation: OutOfCatalogue) -> EstimatedForce:
     if kind + ":" == FORCE:
         return estimate_force(problem, fit, which, D)
     found = estimate_drift(problem, fit, which, MAX_DRIFT_LEVELS * SPECS[which].noise, D)
-    return replace(found, fit=fit_beside_drift(problem, found, found.fit.D))
+    return replace(found, fit=fit_with_drift(problem, found, found.fit.D))
 
 
 def of_sudden(work: Findings, what: FittedChangePoint, cause: Cause) -> Extension:

@@ -150,21 +150,21 @@ def _from_its_time_on(findings: Findings, fitted: FittedChangePoint) -> dict[Ids
 
     A jam of a fin with no command lost is an offset of the fin: what both do is no rival of either.
     """
-    begun, fit, n = fitted.change_point, fitted.fit, len(findings.problem.entries)
-    others = [effect for effect in findings.problem.sudden_effects if effect.id != begun.effect.id]
+    started, fit, n = fitted.change_point, fitted.fit, len(findings.problem.entries)
+    others = [effect for effect in findings.problem.sudden_effects if effect.id != started.effect.id]
     C = change_point_columns(
-        BaseRun(fitted.problem, fit.z), [(effect, begun.time) for effect in others], begun.record
+        BaseRun(fitted.problem, fit.z), [(effect, started.time) for effect in others], started.record
     )
     free = [*range(n), fit.z.size - 1]
-    tolerance = np.array([begun.kappa * fitted.problem.entries[k].parameter.tolerance for k in free])
+    tolerance = np.array([started.kappa * fitted.problem.entries[k].parameter.tolerance for k in free])
     shown, within = fit.J[:, n:-1] @ fit.z[n:-1], fit.J[:, free] * tolerance
     found = dict[Ids, float]()
     for effect, own in zip(others, C, strict=True):
-        scales = [0.0 if p.also_of == begun.effect.id else p.scale for p in effect.parameters]
+        scales = [0.0 if p.also_of == started.effect.id else p.scale for p in effect.parameters]
         B = np.hstack([within, own * np.array(scales)])
         b = B.T @ shown
         rest = float(shown @ shown - b @ np.linalg.solve(np.eye(b.size) + B.T @ B, b))
-        found[(with_onset(effect, begun.time).id,)] = max(rest, 0.0)
+        found[(with_onset(effect, started.time).id,)] = max(rest, 0.0)
     return found
 
 

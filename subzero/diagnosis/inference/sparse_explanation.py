@@ -3,9 +3,9 @@
     G = max over sets of at most MAX_CAUSES terms of  log p(y | terms) p(terms) − log p(y | nothing) p(nothing)
 
 A term is a cause, throughout or from some time of a grid on, which is what a late clock looks like. The set grows by
-the term that gains most; the scales of the noise are found anew behind each set, as in `data_error_yardstick`, which
-has nothing and single causes only (`most_of_physics`). Of a large cause the linear problem at the nominal model says
-little: it is simulated at some sizes, and linearised again where that has it (`most_of_one_cause`).
+the term that gains most; the scales of the noise are found anew behind each set, as in `data_error_saturated_model`,
+which has nothing and single causes only (`most_of_physics`). Of a large cause the linear problem at the nominal model
+says little: it is simulated at some sizes, and linearised again where that has it (`most_of_one_cause`).
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from subzero.diagnosis.inference.change_point_scan import (
     in_rough_steps,
     onset_columns,
 )
-from subzero.diagnosis.inference.data_error_yardstick import (
+from subzero.diagnosis.inference.data_error_saturated_model import (
     KAPPA_NARROW,
-    Reckoned,
+    Evidence,
     Term,
+    evidence_of_terms,
     generous_variances,
     least_scale,
-    reckon,
     stacked,
     to_usual_sizes,
 )
@@ -59,9 +59,11 @@ class Linear:
     own: Mapping[str, slice]
     bare: Mapping[str, Term]
 
-    def reckoned(self) -> Reckoned:
+    def reckoned(self) -> Evidence:
         """Return its evidence, with the scales of the noise that are best."""
-        return reckon(stacked({name: self._term(name, rows) for name, rows in self.own.items()}), self.D)
+        return evidence_of_terms(
+            stacked({name: self._term(name, rows) for name, rows in self.own.items()}), self.D
+        )
 
     def _term(self, name: str, rows: slice) -> Term:
         r, J = self.r[rows], self.J[rows]
@@ -91,11 +93,11 @@ def most_of_physics(problem: Problem, record: int) -> float:
         record: its number.
     """
     here = _linear(problem, record)
-    begun = _begun(problem, record, here)
+    started = _begun(problem, record, here)
     now, log_prior = here.reckoned(), float(np.log(PRIOR["none"]))
     best = none = now.log + log_prior
     for _ in range(MAX_CAUSES):
-        further = [*_causes(problem, here, now), *_onsets(problem, here, now, begun)]
+        further = [*_causes(problem, here, now), *_onsets(problem, here, now, started)]
         found = max(further, key=lambda each: each.log_evidence + each.log_prior)
         here, log_prior = found.beside(), log_prior + found.log_prior
         now = here.reckoned()
@@ -116,7 +118,7 @@ def most_of_one_cause(problem: Problem, record: int) -> float:
     """
     here, names = _linear(problem, record), nameable(problem.entries)
     none = here.reckoned().log + float(np.log(PRIOR["none"]))
-    best: dict[str, Reckoned] = {}
+    best: dict[str, Evidence] = {}
     for k, there in _at_sizes(problem, record, here):
         now, name = there.reckoned(), problem.entries[k].effect.id
         best[name] = max(now, best.get(name, now), key=lambda fit: fit.log)
@@ -126,7 +128,7 @@ def most_of_one_cause(problem: Problem, record: int) -> float:
     return max(logs, default=-np.inf) + float(np.log(PRIOR["single"] / len(names))) - none
 
 
-def _closer_by(problem: Problem, record: int, name: str, now: Reckoned) -> Iterator[float]:
+def _closer_by(problem: Problem, record: int, name: str, now: Evidence) -> Iterator[float]:
     """Give the log evidence of a cause each time it is linearised where the linear problem before has it."""
     for _ in range(MAX_ADDED):
         there = _linear(problem, record, np.clip(now.z, *bounds(problem)))
@@ -187,7 +189,7 @@ def _begun(problem: Problem, record: int, here: Linear) -> dict[Begun, np.ndarra
     return {pair: C[before : before + here.r.size] for pair, C in columns.items()}
 
 
-def _causes(problem: Problem, here: Linear, now: Reckoned) -> Iterator[Further]:
+def _causes(problem: Problem, here: Linear, now: Evidence) -> Iterator[Further]:
     """Give every cause that holds throughout."""
     names, wide = nameable(problem.entries), generous_variances(problem)
     base = Posterior(z=now.z, M=now.M, log_evidence=now.log, log_det=0.0)
@@ -201,20 +203,20 @@ def _causes(problem: Problem, here: Linear, now: Reckoned) -> Iterator[Further]:
 
 
 def _onsets(
-    problem: Problem, here: Linear, now: Reckoned, begun: Mapping[Begun, np.ndarray]
+    problem: Problem, here: Linear, now: Evidence, started: Mapping[Begun, np.ndarray]
 ) -> Iterator[Further]:
     """Give every cause from every time on."""
-    if not begun:
+    if not started:
         return
     J, r = here.scaled(now.scales, here.J), here.scaled(now.scales, here.r)
-    C = here.scaled(now.scales, np.hstack(list(begun.values())))
+    C = here.scaled(now.scales, np.hstack(list(started.values())))
     data = seen(J.T @ J, J.T @ r, here.D, J, C, r)
-    ends = np.cumsum([0, *(columns.shape[1] for columns in begun.values())]).tolist()
-    price = float(np.log(PRIOR["sudden"] / len(begun)))
-    for (effect, time), a, b in zip(begun, ends[:-1], ends[1:], strict=True):
+    ends = np.cumsum([0, *(columns.shape[1] for columns in started.values())]).tolist()
+    price = float(np.log(PRIOR["sudden"] / len(started)))
+    for (effect, time), a, b in zip(started, ends[:-1], ends[1:], strict=True):
         gain = gain_of(ForceInformation(data.M[a:b, a:b], data.q[a:b]), effect)[0]
         more = np.array([parameter.scale**2 for parameter in effect.parameters])
-        yield Further(price, now.log + gain, partial(_with_columns, here, begun[effect, time], more))
+        yield Further(price, now.log + gain, partial(_with_columns, here, started[effect, time], more))
 
 
 def _with_columns(here: Linear, C: np.ndarray, D: np.ndarray) -> Linear:

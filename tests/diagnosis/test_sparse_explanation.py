@@ -16,9 +16,9 @@ from benchmarks.diagnosis import data_errors, world
 from subzero import Logged
 from subzero.diagnosis import Setting, catalogue
 from subzero.diagnosis.inference import DataError, pose
+from subzero.diagnosis.inference.data_error_saturated_model import saturated_model_of
 from subzero.diagnosis.inference.data_error_scan import judged_as_it_is
-from subzero.diagnosis.inference.data_error_yardstick import yardstick_of
-from subzero.diagnosis.inference.few_causes import most_of_one_cause, most_of_physics
+from subzero.diagnosis.inference.sparse_explanation import most_of_one_cause, most_of_physics
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record
 
@@ -46,7 +46,7 @@ def test_an_outlier_among_the_samples_that_a_clock_loses_is_worth_no_more_than_a
         values[name][-3] += size
     spiked = dataclasses.replace(plain, record=Record(source="made", time=TIME, values=values))
     early = DataError(kind="late_clock", amount=-2.0)
-    leads = [judged_as_it_is(yardstick_of(pose([one]), 0, one), early).lead for one in (plain, spiked)]
+    leads = [judged_as_it_is(saturated_model_of(pose([one]), 0, one), early).lead for one in (plain, spiked)]
     assert leads[1] == pytest.approx(leads[0], abs=3.0)
 
 

@@ -29,14 +29,14 @@ from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.hypothesis.noise import (
     Between,
     Noise,
-    Usual,
+    SensorPrior,
     innovations_between,
     level_of,
     log_of_outlier,
     log_of_outliers,
+    prior_noise,
+    sensor_prior,
     spikes,
-    usual_noise,
-    usual_of,
 )
 from subzero.diagnosis.inference.linear_gaussian import KAPPAS, Posterior, each_freed, log_sum, precision
 from subzero.diagnosis.inference.posing import pose
@@ -71,7 +71,7 @@ class Term(NamedTuple):
     measured: int
 
 
-class Reckoned(NamedTuple):
+class Evidence(NamedTuple):
     """The generous evidence, the parameters (k,) and their covariance, and the scale of the noise of each channel."""
 
     log: float
@@ -81,7 +81,7 @@ class Reckoned(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Yardstick:
+class SaturatedModel:
     """What the nominal model, and all that may be wrong with it, say of a record at any time.
 
     Attributes:
@@ -120,7 +120,7 @@ class Yardstick:
     place: int | None = None
     clock: tuple[DataError, ...] = ()
     kept: dict[str, Mapping[str, np.ndarray]] = field(default_factory=dict)
-    others: dict[bytes, Yardstick] = field(default_factory=dict)
+    others: dict[bytes, SaturatedModel] = field(default_factory=dict)
 
     def without(self, error: DataError) -> Logged:
         """Return the record without a further error: a value that it repeats stands at the times that were written."""
@@ -128,7 +128,7 @@ class Yardstick:
             return error.corrected(self.logged)
         return corrected(self.written, (*self.corrected[: self.place], error, *self._later))
 
-    def after(self, errors: Sequence[DataError], place: int | None = None) -> Yardstick:
+    def after(self, errors: Sequence[DataError], place: int | None = None) -> SaturatedModel:
         """Return what the record as it is written is judged by without some errors, and by a further one in a place
         among them; with other commands it has sensitivities of its own.
         """
@@ -138,7 +138,7 @@ class Yardstick:
             base, written=self.written, repeated=self.repeated, corrected=every, place=here, clock=self.clock
         )
 
-    def with_scale_held(self, channels: Iterable[str]) -> Yardstick:
+    def with_scale_held(self, channels: Iterable[str]) -> SaturatedModel:
         """Return the same with the scales of some sensors within tolerances: a unit and a scale that undoes it are no
         error at all.
         """
@@ -160,14 +160,14 @@ class Yardstick:
         """Return the times at which a further error stands (n,). [s]"""
         return corrected(self.written, self.corrected[: self.place]).record.time
 
-    def under(self, logged: Logged) -> Yardstick:
+    def under(self, logged: Logged) -> SaturatedModel:
         """Return what a record is judged by under its own commands, if they are others than this one's."""
         commands = logged.setting.trial.commands
         if commands is self.logged.setting.trial.commands or commands is None:
             return replace(self, logged=logged)
         key = commands.values.tobytes()
         if key not in self.others:
-            self.others[key] = yardstick_of(pose([logged]), 0, logged)
+            self.others[key] = saturated_model_of(pose([logged]), 0, logged)
         return replace(self.others[key], logged=logged, others=self.others)
 
     def terms(self, logged: Logged, channels: Iterable[str]) -> dict[str, Term]:
@@ -201,10 +201,10 @@ class Yardstick:
 
     def _term(self, logged: Logged, name: str, nominal: np.ndarray) -> Term:
         time, values = logged.record.time, logged.record.values[name]
-        usual = usual_of(name, values, logged.noise, logged.steps)
+        usual = sensor_prior(name, values, logged.noise, logged.steps)
         left, used = self._left(logged, name, nominal, usual)
         measured = int(np.count_nonzero(np.isfinite(left)))
-        noise, slopes = usual_noise(time, used, usual), self.slopes[name]
+        noise, slopes = prior_noise(time, used, usual), self.slopes[name]
         r, J = noise.whiten(left), np.empty((noise.count, slopes.shape[1]))
         places = self._places(noise.time, slopes.shape[0])
         innovations_between(slopes, places, *noise.filter, J, np.empty(slopes.shape[1]))
@@ -213,7 +213,7 @@ class Yardstick:
         return Term(J.T @ J, J.T @ r, float(r @ r), noise.count, fixed, least, measured)
 
     def _left(
-        self, logged: Logged, name: str, nominal: np.ndarray, usual: Usual
+        self, logged: Logged, name: str, nominal: np.ndarray, usual: SensorPrior
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return measured − predicted of a channel (n,), and which samples are measured, and no outliers (n,)."""
         values, expected = logged.record.values[name], self.at(nominal, logged.record.time)
@@ -227,7 +227,7 @@ class Yardstick:
         """Channel → which samples of the record as it is are measured, and no outliers (n,)."""
         nominal, values = self.nominal_of(self.logged), self.logged.record.values
         usual = {
-            name: usual_of(name, values[name], self.logged.noise, self.logged.steps) for name in self.own
+            name: sensor_prior(name, values[name], self.logged.noise, self.logged.steps) for name in self.own
         }
         return {name: self._left(self.logged, name, nominal[name], usual[name])[1] for name in self.own}
 
@@ -237,9 +237,9 @@ class Yardstick:
         return self.terms(self.logged, self.logged.record.values)
 
     @cached_property
-    def as_is(self) -> Reckoned:
+    def as_is(self) -> Evidence:
         """The generous evidence of the record as it is."""
-        return reckon(stacked(self.own), self.D)
+        return evidence_of_terms(stacked(self.own), self.D)
 
     @cached_property
     def log_sparse(self) -> float:
@@ -249,7 +249,7 @@ class Yardstick:
     @property
     def log_none(self) -> float:
         """The evidence of nothing, of the record as it is."""
-        return reckon(stacked(self.own), self.narrow).log + float(np.log(PRIOR["none"]))
+        return evidence_of_terms(stacked(self.own), self.narrow).log + float(np.log(PRIOR["none"]))
 
     def deviations(self, name: str, z: np.ndarray) -> np.ndarray:
         """Return measured − predicted of a channel (n,), with parameters in the linear problem. [display unit]"""
@@ -267,15 +267,15 @@ class Yardstick:
         known = np.isfinite(deviations)
         at, left = int(np.searchsorted(time[known], error.since)), deviations[known]
         jump = np.median(left[at : at + BESIDE_JUMP]) - np.median(left[max(at - BESIDE_JUMP, 0) : at])
-        step = usual_of(name, self.logged.record.values[name], self.logged.noise).resolution
+        step = sensor_prior(name, self.logged.record.values[name], self.logged.noise).resolution
         near = float(np.round((jump - error.amount) / step))
         return [replace(error, amount=error.amount + step * (near + k)) for k in (-1.0, 0.0, 1.0)]
 
     def generous(self, terms: Mapping[str, Term]) -> float:
         """Return the log evidence with all of physics at once."""
-        return reckon(stacked(terms), self.D).log
+        return evidence_of_terms(stacked(terms), self.D).log
 
-    def added(self, name: str, rest: Term, as_is: Reckoned) -> float:
+    def added(self, name: str, rest: Term, as_is: Evidence) -> float:
         """Return what samples of a channel that are not in its rest add to the log density of the record as it is."""
         own, scale = self.own[name], as_is.scales[name]
         square = _square(own, as_is.z) - _square(rest, as_is.z)
@@ -289,7 +289,7 @@ class Yardstick:
         lost = {name: np.isfinite(here[name]) & ~np.isin(here[name], after[name]) for name in self.own}
         return {name: some & np.isfinite(self.logged.record.values[name]) for name, some in lost.items()}
 
-    def of_lost(self, name: str, lost: np.ndarray, as_is: Reckoned) -> float:
+    def of_lost(self, name: str, lost: np.ndarray, as_is: Evidence) -> float:
         """Return what samples of a channel (n,) add to the log density of the record as it is: each as much as another
         of its kind, a measurement or an outlier. That one of few more is an outlier is worth as much as ten others.
         """
@@ -304,18 +304,18 @@ class Yardstick:
         return log_sum([log for log, _ in self._each(terms)])
 
     @cached_property
-    def likeliest(self) -> Reckoned:
+    def likeliest(self) -> Evidence:
         """The most probable of nothing and single causes, of the record as it is."""
         return max(self._each(self.own), key=lambda pair: pair[0])[1]
 
-    def _each(self, terms: Mapping[str, Term]) -> list[tuple[float, Reckoned]]:
+    def _each(self, terms: Mapping[str, Term]) -> list[tuple[float, Evidence]]:
         """Return nothing and the best causes with their log posteriors."""
         said = stacked(terms)
-        none = reckon(said, self.narrow)
+        none = evidence_of_terms(said, self.narrow)
         base = Posterior(z=none.z, M=none.M, log_evidence=none.log, log_det=0.0)
         gains = each_freed(base, self.narrow, self.causes, self.D)
         best = sorted(range(len(gains)), key=lambda i: -gains[i])[:CAUSES_TRIED]
-        each = [reckon(said, self._freed(self.causes[i])) for i in best]
+        each = [evidence_of_terms(said, self._freed(self.causes[i])) for i in best]
         prior = float(np.log(PRIOR["single"] / max(len(self.causes), 1)))
         return [
             (none.log + float(np.log(PRIOR["none"])), none),
@@ -346,7 +346,7 @@ def stacked(terms: Mapping[str, Term]) -> Stacked:
     return Stacked(tuple(terms), A.reshape(len(A), -1), b, rr, np.maximum(samples, 1), fixed, least)
 
 
-def reckon(said: Stacked, D: np.ndarray) -> Reckoned:
+def evidence_of_terms(said: Stacked, D: np.ndarray) -> Evidence:
     """Return the generous evidence of what channels say."""
     names, A, b, rr, samples, fixed, least = said
     root = np.sqrt(D)
@@ -362,7 +362,7 @@ def reckon(said: Stacked, D: np.ndarray) -> Reckoned:
             break
     log = -0.5 * float(weights @ rr - here @ z) - float(np.sum(np.log(np.diag(factor))))
     log += float(np.sum(fixed - samples * np.log(before)))
-    return Reckoned(log, z, M, dict(zip(names, before.tolist(), strict=True)))
+    return Evidence(log, z, M, dict(zip(names, before.tolist(), strict=True)))
 
 
 def _covariance(A: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -390,7 +390,9 @@ def least_scale(noise: Noise) -> float:
     return max(LEAST_SCALE, noise.resolution / np.sqrt(2.0 * np.pi) / level)
 
 
-def yardstick_of(problem: Problem, record: int, logged: Logged, z: np.ndarray | None = None) -> Yardstick:
+def saturated_model_of(
+    problem: Problem, record: int, logged: Logged, z: np.ndarray | None = None
+) -> SaturatedModel:
     """Return what a record is judged by; its simulations are those of the sensitivities at the nominal model, or at
     another.
 
@@ -415,7 +417,7 @@ def yardstick_of(problem: Problem, record: int, logged: Logged, z: np.ndarray | 
     nominal = {name: shown[name] - slopes[name] @ z for name in names}
     grid, causes = base[0], [columns_of(problem.entries, (name,)) for name in nameable(problem.entries)]
     scales = {name: k for name in names for k in columns_of(problem.entries, (f"sensor_scale:{name}",))}
-    return Yardstick(
+    return SaturatedModel(
         logged=logged,
         written=logged,
         step=float(grid[1] - grid[0]),
