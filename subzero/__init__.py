@@ -19,6 +19,7 @@ Names come from their modules when they are first used, so that ``import subzero
 `autopilot` leads to linear models and controllers, `CHANNELS` is the table of everything that a run gives.
 """
 
+from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -65,7 +66,13 @@ __all__ = sorted([*_HOME, *_PACKAGES, "__version__"])
 
 
 def __getattr__(name: str) -> Any:
-    """Fetch a public name from its module, once."""
+    """Fetch a public name from its module, once.
+
+    Raises:
+        ImportError: Python finds another package by the name of one of ours.
+    """
+    if name in __all__ and (why := _foreign_package()):
+        raise ImportError(why)
     if name in _GIVE_RUNS:
         import_module("subzero.figures.accessor")
     if name == "__version__":
@@ -83,6 +90,13 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'subzero' has no attribute '{name}'; it has {', '.join(__all__)}")
     globals()[name] = value
     return value
+
+
+@cache
+def _foreign_package() -> str:
+    from subzero.errors import foreign_package
+
+    return foreign_package()
 
 
 def __dir__() -> list[str]:

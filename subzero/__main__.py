@@ -6,19 +6,23 @@ import gc
 import sys
 
 from subzero.cli import interrupts, standard_streams
+from subzero.errors import foreign_package
 
 YOUNG = 50_000
 """So many new objects before Python looks for garbage among them. A command lives for seconds and keeps most of what it
 makes: looking at 700, as Python does, is a tenth of it."""
 
-UNWRITABLE = 2
-"""Exit code where standard output could not be written; files are complete all the same."""
+MISTAKE = UNWRITABLE = 2
+"""Exit codes of what a user has to change, and where standard output could not be written: files are complete then."""
 
 
 def run() -> None:
     """Run the command line with the words of this process, and end it with its exit code."""
     gc.set_threshold(YOUNG)
     standard_streams.protect()
+    if why := foreign_package():
+        print(why, file=sys.stderr)
+        sys.exit(MISTAKE)
     try:
         interrupts.watch()
         from subzero.cli.app import main

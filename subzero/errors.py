@@ -10,14 +10,19 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable, Mapping
+from importlib.util import find_spec
 from math import inf, isfinite
 from numbers import Integral, Real
+from pathlib import Path
 from typing import TypeVar
 
 Line = TypeVar("Line")
 
 DISTRIBUTION = "subzero-auv"
 """Name in the package index, where "subzero" is another project."""
+
+OUR_PACKAGES = {"cable": '"""The cable:', "vehicle": '"""The vehicle:', "scenarios": '"""Trials as data:'}
+"""Packages that are imported by names that others may have, too → how their first file begins."""
 
 SHOWN_PROBLEMS = 12
 """So many problems of one file are spelt out: enough to repair it, few enough to read on one screen."""
@@ -32,6 +37,22 @@ class UserError(Exception):
 
 class BadValueError(UserError, ValueError):
     """A value that cannot be used, refused where it is made; a `ValueError` too, as Python has it."""
+
+
+def foreign_package() -> str:
+    """Return what is wrong where Python finds another package by the name of one of ours; empty if nothing is."""
+    for name, beginning in OUR_PACKAGES.items():
+        spec = find_spec(name)
+        origin = spec.origin if spec else None
+        if origin is None or not Path(origin).read_text(encoding="utf-8", errors="replace").startswith(
+            beginning
+        ):
+            where = printable(origin) if origin else "a folder without code" if spec else "nowhere"
+            return (
+                f"subzero needs its own package '{name}', and Python finds that name {'in ' if origin else ''}{where}. "
+                f"Rename or move what is there, or install {DISTRIBUTION} in an environment of its own."
+            )
+    return ""
 
 
 def real(value: object) -> float | None:

@@ -47,8 +47,6 @@ for name in ("cable", "scenarios", "vehicle", "subzero"):
 
 RUN = """
 sys.argv[:] = ["subzero", *{arguments!r}]
-from subzero.sweeps import processes
-processes.FORKS = False
 from subzero.__main__ import run
 run()
 """
@@ -94,3 +92,22 @@ def test_commands_do_their_work(arguments, file, tmp_path):
     done = started(RUN.format(arguments=arguments), tmp_path)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / file).exists(), [str(path) for path in tmp_path.rglob("*")]
+
+
+@pytest.mark.parametrize("name", ["cable", "vehicle", "scenarios"])
+@pytest.mark.parametrize("form", ["{}.py", "{}/__init__.py"])
+def test_another_package_by_the_name_of_ours_is_named_in_one_line(name, form, tmp_path):
+    """A user's own cable.py in the folder where Python starts, or a package of that name installed later."""
+    path = tmp_path / form.format(name)
+    path.parent.mkdir(exist_ok=True)
+    path.write_text('"""Mine."""\n')
+    env = os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    command = [sys.executable, "-m", "subzero", "list"]
+    done = subprocess.run(command, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert f"needs its own package '{name}'" in done.stderr
+    assert str(path) in done.stderr
+    used = [sys.executable, "-c", "import subzero; subzero.simulate"]
+    done = subprocess.run(used, cwd=tmp_path, env=env, capture_output=True, text=True, check=False)
+    assert f"ImportError: subzero needs its own package '{name}'" in done.stderr
