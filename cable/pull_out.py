@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Never
+from typing import Any
 
 import numpy as np
 
@@ -74,13 +74,12 @@ SCHEMES: Mapping[str, Scheme] = {
 def pull_out(
     tow_velocity: Velocity,
     duration: float,
-    *moved: Never,
+    *,
     cable: CableProperties | None = None,
     drum: Drum | MovingDrum | None = None,
     current: Sequence[float] | np.ndarray | Current | None = None,
     start: float | Equilibrium = 0.0,
     scheme: str | Options = "moving_end",
-    **moved_too: Never,
 ) -> History:
     """Pull a cable off a drum, starting with the tow point at the drum unless `start` says otherwise.
 
@@ -94,7 +93,6 @@ def pull_out(
     Args:
         tow_velocity: function of time [s] that gives the tow point's velocity north, east, down (3,). [m/s]
         duration: how long. [s]
-        moved: nothing; where an argument of older versions is now, a message says.
         cable: the cable; Table 1 of the source when not given.
         drum: a free drum, a winch (`cable.winch`), or a `cable.MovingDrum` with one of these on a boat; the free drum
             of Table 1 on the shore when not given.
@@ -105,7 +103,6 @@ def pull_out(
             (unless others are given), its length and its segments.
         scheme: how it is computed: `cable.MovingEnd` (the default), `cable.Lumped`, `cable.Equation7` or `cable.Paper`,
             each with its options, or a name of `cable.SCHEMES` for one as it is by default.
-        moved_too: nothing, as `moved`.
 
     Returns:
         the history from t = 0 on. Look at `history.outcome`: a run that could not go on keeps what it has.
@@ -115,7 +112,6 @@ def pull_out(
             for, a tow velocity or current that is not three finite numbers, a run that does not fit into memory. (Bad
             values are a ValueError, too.)
     """
-    _refuse_moved("pull_out", moved, moved_too)
     row, options = _chosen(scheme)
     task = PullOut.of(tow_velocity, duration, cable=cable, drum=drum, current=current, start=start)
     missing = [what for what in task.asks_for() if what not in row.knows]
@@ -132,12 +128,11 @@ def tow(
     tow_velocity: Velocity,
     length: float,
     duration: float,
-    *moved: Never,
+    *,
     cable: CableProperties | None = None,
     current: Sequence[float] | np.ndarray | Current | None = None,
     drogue_drag_area: float = 0.0,
     scheme: str | Options = "moving_end",
-    **moved_too: Never,
 ) -> History:
     """Tow a cable of fixed length, starting from the exact steady straight tow.
 
@@ -148,13 +143,11 @@ def tow(
         tow_velocity: function of time [s] that gives the tow point's velocity north, east, down (3,). [m/s]
         length: L; segments are a little shorter where it is not a whole number of them. [m]
         duration: how long. [s]
-        moved: nothing; where an argument of older versions is now, a message says.
         cable: the cable; Table 1 of the source when not given.
         current: velocity of the water north, east, down (3,) [m/s], or a `cable.Current` that changes with place and
             time (places relative to the tow point at the start); still water when not given.
         drogue_drag_area: C_d A of a drogue at the free end; 0 is a free tail. [m²]
         scheme: as in `cable.pull_out`; the paper's cannot tow a free end.
-        moved_too: nothing, as `moved`.
 
     Returns:
         the history; positions are relative to where the tail is at the start, `drum_tension` is the one at the tail.
@@ -164,7 +157,6 @@ def tow(
 
     Checked by: tests/exact/test_tow.py
     """
-    _refuse_moved("tow", moved, moved_too)
     row, options = _chosen(scheme)
     if row.tow is None:
         able = " or ".join(repr(name) for name, other in SCHEMES.items() if other.tow)
@@ -186,30 +178,3 @@ def _chosen(scheme: object) -> tuple[Scheme, Options]:
         f"scheme {short(scheme)} is unknown; choose one of {', '.join(SCHEMES)}, or one with options, such as"
         f" cable.MovingEnd(rtol=1e-3).{suggestion(scheme, SCHEMES)}"
     )
-
-
-OPTIONS = {
-    "step": "time_step",
-    **{name: name for name in ("segment_length", "rtol", "grading", "run_in", "tolerance")},
-}
-"""Argument of older versions → the option of a scheme that it became."""
-
-
-def _refuse_moved(function: str, moved: tuple[object, ...], named: Mapping[str, object]) -> None:
-    """Refuse arguments of older versions, with where they are now."""
-    if len(moved) > 1:
-        raise TypeError(f"{function}() takes no further arguments without a name.")
-    given = ({"step": moved[0]} if moved else {}) | dict(named)
-    places = []
-    options = [f"{OPTIONS[name]}={short(value)}" for name, value in given.items() if name in OPTIONS]
-    if options:
-        places.append(f"scheme=cable.MovingEnd({', '.join(options)})")
-    if "wet_length" in given:
-        places.append(f"start={short(given['wet_length'])}")
-    if "drum_velocity" in given:
-        places.append("drum=cable.MovingDrum(velocity=..., drum=...)")
-    unknown = [name for name in given if name not in (*OPTIONS, "wet_length", "drum_velocity")]
-    if unknown:
-        raise TypeError(f"{function}() got an unexpected keyword argument {unknown[0]!r}")
-    if places:
-        raise BadValueError(f"{function}: {', '.join(given)} moved. Write {', '.join(places)}.")

@@ -57,7 +57,10 @@ def checked_arguments(made: Made) -> Made:
 
     @functools.wraps(made)
     def checking(*positional: Any, **named: Any) -> Any:
-        given = signature.bind(*positional, **named).arguments
+        try:
+            given = signature.bind(*positional, **named).arguments
+        except TypeError as error:
+            raise TypeError(f"{owner}() {error}") from None
         for name, hint in _hints(made).items():
             if name in given and not _fits(given[name], hint):
                 raise BadValueError(f"{owner}: {name} is {short(given[name])}; it must be {_words(hint)}.")

@@ -66,22 +66,12 @@ def test_a_value_that_makes_no_sense_is_refused_where_it_is_made(make, said):
         ({"drum": 0.1}, "pull_out: drum is 0.1; it must be DrumProperties or"),
         ({"cable": 0.1}, "cable is 0.1; it must be CableProperties or None."),
         ({"start": -1.0}, "start is -1"),
-        ({"step": 0.2}, "step moved. Write scheme=cable.MovingEnd(time_step=0.2)."),
-        ({"rtol": 1e-3, "wet_length": 5.0}, "Write scheme=cable.MovingEnd(rtol=0.001), start=5"),
-        ({"drum_velocity": ahead}, "Write drum=cable.MovingDrum(velocity=..., drum=...)."),
     ],
 )
 def test_a_pull_that_makes_no_sense_is_refused_with_what_to_do(options, said):
     with pytest.raises(subzero.UserError) as caught:
         cable.pull_out(ahead, **({"duration": 1.0} | options))
     assert said in str(caught.value)
-
-
-def test_a_step_without_a_name_is_told_where_it_went():
-    with pytest.raises(
-        subzero.UserError, match=r"tow: step moved\. Write scheme=cable\.MovingEnd\(time_step=0\.2\)"
-    ):
-        cable.tow(ahead, 5.0, 1.0, 0.2)
 
 
 @pytest.mark.parametrize(
