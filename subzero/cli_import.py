@@ -82,7 +82,7 @@ def _written(
     """Write all records with their maps, or the map that was asked for, and return what was written."""
     from subzero.atomic_output import open_output_folder
     from subzero.logs.api import to_csv
-    from subzero.logs.mapping import to_toml
+    from subzero.logs.map_file import to_toml
     from subzero.logs.table import refusal
     from subzero.records.record import read_record
     from subzero.user_file import MEGABYTE, MOST_OF_A_CSV

@@ -208,14 +208,14 @@ def test_of_two_pressure_sensors_the_one_that_dives_is_taken_and_it_is_said(tmp_
     inside = 99_790.0 + 40.0 * t / 30.0 + rng.normal(0.0, 8.0, t.size)
     outside = 101_325.0 + 1025.0 * 9.81 * depth + rng.normal(0.0, 30.0, t.size)
     rows = [",".join(f"{x:.9g}" for x in row) for row in zip(t, speed, pitch, inside, outside, strict=True)]
-    head = "time_s,surge_speed_m_s,pitch_deg,BARO[0].Press,BARO[1].Press"
+    head = "time_s,surge_speed_m_s,pitch_deg,press[0],press[1]"
     path = make(tmp_path / "log.csv", "\n".join([head, *rows]) + "\n")
     assert_allclose(subzero.read_log(path).values["depth"], depth, atol=0.02)
     from subzero.logs.api import import_log
 
     reasons = {row[0]: row[4] for row in import_log(path).table()}
-    assert "which 'BARO[0].Press' does not" in reasons["BARO[1].Press"]
-    assert reasons["BARO[0].Press"] == "not used: 'BARO[1].Press' is the depth"
+    assert "which 'press[0]' does not" in reasons["press[1]"]
+    assert reasons["press[0]"] == "not used: 'press[1]' is the depth"
 
 
 def test_two_sensors_that_differ_are_asked_about(tmp_path):
@@ -318,7 +318,9 @@ def test_a_log_of_ardupilot_is_read_without_the_barometer_in_the_hull():
     found = import_log(SHARED / "ardusub_logs" / "small.BIN")
     lines = {line.name: line for line in found.mapping.lines}
     assert lines["CTUN.BAlt"].channel == "depth"
-    assert lines["BARO[0].Alt"].channel == ""
+    assert "BARO[0].Alt" not in lines
+    assert any("BARO[0].Alt" in note and "inside the hull" in note for note in found.record.notes)
+    assert any(note.startswith("RCOU.C1 to ") and "the pulse of a motor" in note for note in found.record.notes)
     assert lines["ATT.Yaw"].unit == "degree"
 
 
@@ -330,5 +332,5 @@ def test_what_is_no_log_of_ardupilot_is_named(tmp_path):
 
 def test_without_pymavlink_a_log_of_ardupilot_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pymavlink.DFReader", None)
-    with pytest.raises(UserError, match=r"pymavlink is not installed. pip install 'subzero-auv\[logs\]'"):
+    with pytest.raises(UserError, match=r"needs pymavlink: pip install 'subzero-auv\[logs\]'"):
         subzero.read_log(make(tmp_path / "log.bin", b"x"))
