@@ -10,19 +10,21 @@ No file executes code: rosbags compiles definitions of messages that stand in a 
 from __future__ import annotations
 
 import contextlib
-import io
 import json
 import math
+import os
 import re
+import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
+from subzero.channels import TIME
 from subzero.errors import UserError, missing_extra, printable
-from subzero.logs.names import reason_unused
+from subzero.logs.names import reason_unused, recognised
 from subzero.logs.table import (
     Column,
     Progress,
@@ -98,20 +100,22 @@ def _by_library(
     """Return a reader that stands on a library: silent, and with one message for all that goes wrong."""
 
     def reader(path: Path, wanted: Wanted, progress: Progress) -> Table:
-        notes, said, unused = Notes(), io.StringIO(), dict[str, list[str]]()
+        notes, unused = Notes(), dict[str, list[str]]()
 
         def is_wanted(name: str, unit: str) -> bool:
             if (name, unit) not in known:
                 if reason := reason_unused(name):
                     unused.setdefault(reason, []).append(name)
-                known[name, unit] = wanted(name, unit)
+                named = recognised(name, unit)
+                known[name, unit] = wanted(name, unit) and not (named and named.channel == TIME.name)
             return known[name, unit]
 
         known: dict[tuple[str, str], bool] = {}
         try:
-            with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+            with _silence() as said:
                 found = read(path, is_wanted, notes)
                 columns = found if isinstance(found, dict) else side_by_side(found)
+                is_damaged = said.tell() > 0
         except ImportError:
             raise missing_extra(f"The log {printable(str(path))}", library, "logs") from None
         except UserError:
@@ -119,11 +123,27 @@ def _by_library(
         except Exception as error:  # those libraries raise all kinds
             why = printable(re.sub(r"\s+", " ", str(error))[:120])
             raise refusal(path, f"it is damaged or no {kind} ({why})", remedy) from None
-        notes += ["Parts of it are damaged or cut off, and are left out."] if said.getvalue() else []
+        notes += ["Parts of it are damaged or cut off, and are left out."] if is_damaged else []
         notes += [f"{_some(names)}: not used: {reason}." for reason, names in unused.items()]
         return Table(str(path), columns, tuple(notes))
 
     return reader
+
+
+@contextlib.contextmanager
+def _silence() -> Iterator[IO[str]]:
+    """Give a file that holds all that is printed meanwhile, also by machine code."""
+    with tempfile.TemporaryFile("w+") as said:
+        with contextlib.suppress(OSError):  # a closed standard error
+            kept = os.dup(2)
+            os.dup2(said.fileno(), 2)
+        try:
+            with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
+                yield said
+        finally:
+            if "kept" in locals():
+                os.dup2(kept, 2)
+                os.close(kept)
 
 
 def _some(names: list[str]) -> str:
@@ -195,8 +215,8 @@ def _dataflash(path: Path, wanted: Wanted, notes: Notes) -> Iterator[Sample]:
         while (message := log.recv_msg()) is not None:
             fields = message.to_dict()
             if "TimeUS" in fields:
-                units = dict(zip(message.fmt.columns, message.fmt.units or [], strict=False))
-                yield from _of_mavlink(fields, "I", units, 1e-6 * fields["TimeUS"], wanted)
+                # without the units in the log: those of ArduSub say cm of a depth in m (CTUN.BAlt)
+                yield from _of_mavlink(fields, "I", {}, 1e-6 * fields["TimeUS"], wanted)
         if log.remaining:
             print("cut")  # said in one sentence with all other damage
 
@@ -236,7 +256,8 @@ def _ulog(path: Path, wanted: Wanted, notes: Notes) -> Iterator[Sample]:
     """Give the numbers of a PX4 log; ``q`` is an attitude to north, east, down."""
     from pyulog import ULog
 
-    log = ULog(str(path))
+    with open(path, "rb") as file:
+        log = ULog(file)
     if log.file_corruption:
         print("damaged")
     for topic in log.data_list:
