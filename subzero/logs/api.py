@@ -26,7 +26,6 @@ from subzero.logs.names import (
     TARGETS,
     UNITS,
     kind_of,
-    reason_unused,
     recognised,
 )
 from subzero.logs.table import NUMBER, Progress, Table, refusal
@@ -117,10 +116,8 @@ def import_log(
         rows, time, notes = _rows(path, table, mapping.clock)
         mapping = replace(mapping, notes=contradictions(mapping, table, rows, time))
     if not any(line.channel for line in mapping.lines) and not mapping.questions:
-        names = ", ".join(short(name) for name in table.columns if not reason_unused(name))
-        raise refusal(
-            path, f"none of its columns is a channel: {names}", "Name them in a map, see docs/logs.md."
-        )
+        why = f"none of its columns is a channel: {', '.join(map(short, table.columns))}"
+        raise refusal(path, why, "Name them in a map, see docs/logs.md.")
     if mapping.questions:
         return Imported(source=table.source, mapping=mapping)
     values, more = _values(table, mapping, rows)
@@ -160,7 +157,7 @@ def _seconds(path: str | Path, table: Table, clock: Clock) -> np.ndarray:
     if any(column.form == times.MIXED for column in columns):
         raise refusal(path, "some of its times have a zone and some have none", "Write all of them with one.")
     scales = [1.0, CLOCK_UNITS["ns"] if columns[-1].form == NUMBER else 1.0]  # seconds and their nanoseconds
-    total: np.ndarray = sum(column.values * scale for column, scale in zip(columns, scales, strict=False))
+    total: np.ndarray = np.sum([scale * c.values for c, scale in zip(columns, scales, strict=False)], axis=0)
     if [column.form for column in columns] == [times.TIME_OF_DAY]:
         return times.over_midnight(total)
     likely = [*times.unit_by_values(total), "s"][0] if clock.unit == ASKED else clock.unit or "s"

@@ -8,6 +8,7 @@ and of a file with more rows than a record can have only every n-th row is.
 from __future__ import annotations
 
 import csv
+import io
 import itertools
 import os
 import re
@@ -65,7 +66,7 @@ class _Layout(NamedTuple):
 
 def read_csv(path: Path, wanted: Wanted, progress: Progress) -> Table:
     """Read a table in text."""
-    layout = _layout(path, list(itertools.islice((line for line, _ in lines_of(path)), SAMPLE)))
+    layout = _layout(path, list(itertools.islice(lines_of(path), SAMPLE)))
     parts: list[list[Column]] = [[] for _ in layout.names]
     kept, notes = list[int](), list[str]()
     for rows in _chunks(path, layout, notes, progress):
@@ -103,15 +104,22 @@ def _hold_stride(path: Path, columns: Sequence[np.ndarray], stride: int) -> None
         raise refusal(path, why, "Split it.")
 
 
-def lines_of(path: Path) -> Iterator[tuple[str, float]]:
-    """Give the lines of a text file, without ends, and the share of the file that is read."""
-    size = max(os.path.getsize(path), 1)
-    with open(path, encoding=_encoding(path), errors="replace", newline=None) as file:
-        while line := file.readline(LONGEST_LINE):
+def lines_of(path: Path, progress: Progress = lambda _: None) -> Iterator[str]:
+    """Give the lines of a text file, without ends."""
+    size = os.path.getsize(path)
+    with (
+        open(path, "rb") as raw,
+        io.TextIOWrapper(raw, _encoding(path), errors="replace", newline=None) as file,
+    ):
+        for number in itertools.count(1):
+            if not (line := file.readline(LONGEST_LINE)):
+                return
             if len(line) == LONGEST_LINE:
                 why = f"a line has more than {LONGEST_LINE} characters"
                 raise refusal(path, why, "Is it a table in text?")
-            yield line.rstrip("\n"), file.buffer.tell() / size
+            if number % CHUNK == 0:
+                progress(raw.tell() / size)
+            yield line.rstrip("\n")
 
 
 def _encoding(path: Path) -> str:
@@ -204,7 +212,7 @@ def _chunks(path: Path, layout: _Layout, notes: list[str], progress: Progress) -
     cut off is left out.
     """
     rows, width, cut, count = list[list[str]](), len(layout.names), 0, 0
-    for number, (line, share) in enumerate(lines_of(path), start=1):
+    for number, line in enumerate(lines_of(path, progress), start=1):
         if number <= layout.skipped or not line.strip() or line.startswith(REMARKS):
             continue
         if cut:
@@ -219,7 +227,6 @@ def _chunks(path: Path, layout: _Layout, notes: list[str], progress: Progress) -
         else:
             cut = number
         if len(rows) == CHUNK:
-            progress(share)
             yield rows
             rows = []
     notes += [f"The last row, line {cut}, was cut off and is left out."] if cut else []
@@ -295,7 +302,7 @@ def read_alog(path: Path, wanted: Wanted, progress: Progress) -> Table:
     """Read the numbers of a MOOS log: ``time  NAME  source  value``; each name becomes a column with gaps."""
 
     def samples() -> Iterator[Sample]:
-        for line, _ in lines_of(path):
+        for line in lines_of(path, progress):
             parts = line.split(None, 3)
             if len(parts) == 4 and not line.startswith("%") and wanted(parts[1], ""):
                 time, value = _number(parts[0], "."), _number(parts[3].strip(), ".")
