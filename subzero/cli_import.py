@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,7 +17,9 @@ from subzero.voice import PLAIN, Voice
 if TYPE_CHECKING:
     from subzero.logs.api import Imported
 
-FINE, ASKED = 0, 2
+FINE = 0
+LARGE = 20_000_000
+"""A log of more has a progress bar. [byte]"""
 SHORTER = "Name fewer columns in a map, or split the log."
 HEADINGS = ("column", "channel", "unit", "factor", "why")
 
@@ -32,7 +36,7 @@ def import_(
     """Make records of logs as their loggers wrote them: names, units and times found, and every change said.
 
     Args:
-        logs: CSV of any delimiter, .mat, .nc, .alog or .bin; each becomes a record.
+        logs: CSV of any delimiter, .mat, .nc, .alog, .bin, .tlog, .ulg, .mcap, .bag or .db3; each becomes a record.
         map: TOML file that says which column is which channel, in which unit; found from names and values without it.
         out: the record; its map goes there too, as NAME.map.toml. With several logs a folder, for one record of each.
         map_out: write the map to this file, and no record: to edit it, and give it again with --map.
@@ -41,7 +45,8 @@ def import_(
     from subzero.logs.api import import_log, undecided
 
     targets = _targets(logs, out, map_out)
-    found = [import_log(log, map) for log in logs]
+    with contextlib.ExitStack() as stack:
+        found = [import_log(log, map, _progress_of(log, stack)) for log in logs]
     open_ones = [log for log in found if log.record is None]
     if open_ones and map_out is None:
         raise undecided(open_ones[0])
@@ -52,6 +57,15 @@ def import_(
             _tell(log)
         print(f"Wrote {', '.join(printable(str(folder / name)) for name in written['files'])}")
     return FINE
+
+
+def _progress_of(log: Path, stack: contextlib.ExitStack) -> Callable[[float], None]:
+    """Return a progress bar for a log that takes a while."""
+    if not log.is_file() or log.stat().st_size < LARGE:
+        return lambda share: None
+    from subzero.progress import progress_bar
+
+    return stack.enter_context(progress_bar(f"Reading {printable(log.name)}"))
 
 
 def _targets(logs: list[Path], out: Path, map_out: Path | None) -> list[Path]:

@@ -156,8 +156,11 @@ def _seconds(path: str | Path, table: Table, clock: Clock) -> np.ndarray:
     columns = [table.columns[name] for name in clock.columns]
     if any(column.form == times.MIXED for column in columns):
         raise refusal(path, "some of its times have a zone and some have none", "Write all of them with one.")
-    scales = [1.0, CLOCK_UNITS["ns"] if columns[-1].form == NUMBER else 1.0]  # seconds and their nanoseconds
-    total: np.ndarray = np.sum([scale * c.values for c, scale in zip(columns, scales, strict=False)], axis=0)
+    if len(columns) == 2 and columns[1].form == NUMBER:
+        return columns[0].values + columns[1].values * CLOCK_UNITS[times.fraction_unit(columns[1].values)]
+    total: np.ndarray = np.sum([column.values for column in columns], axis=0)
+    if clock.unit == "hhmmss":
+        return times.over_midnight(times.seconds_of_digits(total))
     if [column.form for column in columns] == [times.TIME_OF_DAY]:
         return times.over_midnight(total)
     likely = [*times.unit_by_values(total), "s"][0] if clock.unit == ASKED else clock.unit or "s"

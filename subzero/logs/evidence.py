@@ -35,6 +35,8 @@ SURFACE_M = 1.0
 """A vehicle is not above the surface, but for the zero of its sensor. [m]"""
 LARGEST_ANGLES = {"heading": 2.0 * math.pi, "pitch": 0.5 * math.pi, "roll_angle": math.pi}
 """Channel → the largest angle that it has on a circle. [rad]"""
+MOST_TURNS = 10.0
+"""A heading that counts on has turned no more often. [-]"""
 QUARTER_TURN = 0.5 * math.pi
 FAMILIES = {"degree": "angles", "degree/s": "rates", LATITUDE: "places", LONGITUDE: "places"}
 """Units of a kind that are the same in all columns of a log whose names say none; so are those of north and east."""
@@ -180,12 +182,19 @@ def _possible(columns: Mapping[str, Measured], variables: Mapping[str, str]) -> 
     found: dict[str, list[str]] = {}
     for channel, column in columns.items():
         units = [column.unit] if column.is_sure else units_by_size(channel, column.values)
-        units += [column.unit] if column.unit in RARE and column.unit not in units else []
+        if column.unit not in units and (column.unit in RARE or _counts_turns(column)):
+            units.append(column.unit)
         found[variables[channel]] = [unit for unit in found.get(variables[channel], units) if unit in units]
     loose = [column for channel, column in columns.items() if variables[channel] == "angles"]
     if circle := _circle(loose):
         found["angles"] = [circle]
     return found
+
+
+def _counts_turns(column: Measured) -> bool:
+    """Say whether a column is a heading that its name has in radians or degrees, and that counts on over some turns."""
+    turn = {"rad": 2.0 * math.pi, "degree": 360.0}.get(column.unit, 0.0) if column.channel == "heading" else 0.0
+    return bool(np.nanmax(np.abs(column.values)) <= MOST_TURNS * turn)
 
 
 def _circle(loose: Sequence[Measured]) -> str:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from subzero.channels import TIME
-from subzero.errors import UserError, short
+from subzero.errors import short
 from subzero.logs import times
 from subzero.logs.evidence import Contradiction, Findings, Measured, findings, tied, units_by_size
 from subzero.logs.names import (
@@ -22,7 +22,7 @@ from subzero.logs.names import (
     reason_unused,
     recognised,
 )
-from subzero.logs.table import NUMBER, TEXT, Table
+from subzero.logs.table import NUMBER, TEXT, Table, refusal
 
 ASKED = "?"
 """Unit in a map that the user has to fill in."""
@@ -105,11 +105,12 @@ def find_clock(table: Table) -> tuple[Clock, tuple[str, ...]]:
     if len(clocks) == 2 or (not named and times.TIME_OF_DAY in by_form):
         return Clock(columns=tuple(clocks), reason="date and time of day"[0 if len(clocks) == 2 else 9 :]), ()
     if not named:
-        raise UserError(
-            f"The log {table.source} cannot be imported: none of its columns is a time. Name it in the map: [time] "
-            'columns = ["NAME"], unit = "s", or say how far rows are apart: [time] every_s = 0.1.'
-        )
+        why = f"none of its columns is a time: {', '.join(map(short, table.columns))}"
+        remedy = 'Name it in the map: [time] columns = ["NAME"], unit = "s", or say how far rows are apart: every_s = 0.1.'
+        raise refusal(table.source, why, remedy)
     name = min(named, key=lambda name: named[name].rank)
+    if fractions := [other for other in named if _are_fractions(table, name, other)]:
+        return Clock(columns=(name, fractions[0]), unit="s", reason="seconds and their fractions"), ()
     return _clock_of_numbers(name, table.columns[name].values, named[name].unit)
 
 
@@ -117,6 +118,15 @@ def _is_time(table: Table, name: str) -> Named | None:
     """Return what is said of a column of numbers that is a time by its name."""
     found, column = recognised(name, table.columns[name].unit), table.columns[name]
     return found if found and found.channel == TIME.name and np.isfinite(column.values).any() else None
+
+
+def _are_fractions(table: Table, name: str, other: str) -> bool:
+    """Say whether the fractions of a clock in whole seconds stand in another column, as its name and numbers say."""
+    both = [column.values[np.isfinite(column.values)] for column in (table.columns[name], table.columns[other])]
+    named = recognised(other)
+    is_whole = all(values.size and np.all(values == np.round(values)) for values in both)
+    return bool(is_whole and named and named.unit in ("us", "ns") and both[1].max() < 1e9 and np.ptp(both[1]) > 0.0
+                and (np.diff(both[0]) == 0.0).any())  # fmt: skip
 
 
 def _clock_of_numbers(name: str, values: np.ndarray, written: str) -> tuple[Clock, tuple[str, ...]]:

@@ -146,17 +146,19 @@ def _layout(path: Path, lines: list[str]) -> _Layout:
     delimiter, decimal = max(FORMATS, key=lambda kind: _fit(plain, *kind))
     width = _width([_cells(line, delimiter) for line in plain])
     rows = [(at, _cells(line.lstrip("#%/ "), delimiter), line.startswith(REMARKS)) for at, line in written]
-    full = [row for row in rows if len(row[1]) == width]
-    first = next(k for k, (_, _, is_remark) in enumerate(full) if not is_remark)
-    first -= _has_numbers(full[first][1], decimal)  # then the names stand in a remark before, or nowhere
-    if first < 0:
+    if all(not row[-1] for _, row, _ in rows if len(row) == width):  # a delimiter behind each row, but for the names
+        rows = [(at, [*row, ""] if len(row) == width - 1 else row, is_remark) for at, row, is_remark in rows]
+    full = [(at, row, is_remark) for at, row, is_remark in rows if len(row) == width]
+    is_data = [not is_remark and _has_numbers(row, decimal) for _, row, is_remark in full]
+    head = full[: is_data.index(True) if any(is_data) else None]
+    at, units = (head[-1][0] if head else 0), [""] * width
+    if head and _are_units(head[-1][1], decimal):
+        units = head.pop()[1]
+    if not head:
         raise refusal(path, "its first row has numbers, not names of columns", "Write names above it.")
-    at, units = full[first][0], [""] * width
-    if len(full) > first + 1 and _are_units(full[first + 1][1], decimal):
-        at, units, _ = full[first + 1]
     length = sum(len(line) + 1 for line in plain) / len(plain)
     stride = -int(-os.path.getsize(path) / length // MOST_ROWS)
-    return _Layout(delimiter, decimal, _distinct(full[first][1]), tuple(units), at + 1, stride)
+    return _Layout(delimiter, decimal, _distinct(head[-1][1]), tuple(units), at + 1, stride)
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
@@ -294,6 +296,7 @@ def _with_hemispheres(columns: dict[str, Column]) -> list[str]:
         if columns[letters].form == HEMISPHERE and found and found.channel in (LATITUDE, LONGITUDE):
             signed = np.abs(columns[name].values) * columns[letters].values
             columns[name] = replace(columns[name], values=signed)
+            columns[letters] = replace(columns[letters], form=TEXT)
             notes.append(f"{short(name)} has the signs of the letters in {short(letters)}.")
     return notes
 

@@ -25,6 +25,9 @@ DAY = 86400.0
 EPOCHS = {1e17: "ns", 1e14: "us", 1e11: "ms", 1e9: "s"}
 """A first time beyond this counts from 1970 in that unit."""
 
+DAYS = (4e4, 6e4), (7e5, 8e5)
+"""Between these lie the days that Excel counts from 1900, and MATLAB from year 0, in this century."""
+
 STEP_LIMITS_S = 5e-3, 5.0
 """Between these lie the steps of logs, less than a factor of 1000 apart, so that a step tells s, ms, us and ns. [s]"""
 
@@ -36,6 +39,8 @@ _DATE = re.compile(
     r"(?P<Y>\d{4})[-/](?P<m>\d\d)[-/](?P<d>\d\d)$|(?P<a>\d\d?)(?P<sign>[./])(?P<b>\d\d?)[./](?P<y>\d{4})$"
 )
 _BOTH = re.compile(r"(\d{4}[-/]\d\d[-/]\d\d|\d\d?[./]\d\d?[./]\d{4})[T ]\s*(\d\d?:\d\d.*)$")
+MONTHS = "janfebmaraprmayjunjulaugsepoctnovdec"
+_WORDS = re.compile(rf"(?i)(\d\d?)[- ]({'|'.join(re.findall('...', MONTHS))})[- ](\d{{4}})(.*)$")
 _ZONE = re.compile(r"(Z|[+-]\d\d:?\d*)$")
 
 
@@ -49,7 +54,11 @@ def seconds_of(cell: str) -> tuple[str, float] | None:
         return _date(match)
     if match := _BOTH.match(cell):
         return _date_and_time(*match.groups())
-    return None
+    if match := _WORDS.match(cell):
+        day, month, year, rest = match.groups()
+        return seconds_of(f"{year}-{MONTHS.index(month.lower()) // 3 + 1:02}-{int(day):02}{rest}")
+    found = _since_1970(cell) if "T" in cell else None  # 20261025T005950Z
+    return None if found is None else (DATE_AND_TIME[bool(_ZONE.search(cell))], found)
 
 
 def _decimal(seconds: str | None) -> float:
@@ -129,7 +138,27 @@ def unit_by_values(clock: np.ndarray) -> list[str]:
     steps = np.diff(known)
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
     low, high = STEP_LIMITS_S
+    if _counts_in_sixties(known) and step < 40.0 and (np.abs(steps - step - 40.0) < step).any():
+        return ["hhmmss"]
+    if any(least < known[0] < most for least, most in DAYS) and low <= step * DAY <= high:
+        return ["datenum"]
     return [unit for unit in ("s", "ms", "us", "ns") if low <= step * CLOCK_UNITS[unit] <= high]
+
+
+def _counts_in_sixties(clock: np.ndarray) -> bool:
+    """Say whether numbers can be hours, minutes and seconds in two digits each."""
+    return bool(np.all((clock % 100.0 < 60.0) & (clock % 10_000.0 < 6_000.0) & (clock < 240_000.0)))
+
+
+def seconds_of_digits(clock: np.ndarray) -> np.ndarray:
+    """Return times (n,) that are written as hhmmss. [s]"""
+    return 3600.0 * (clock // 10_000.0) + 60.0 * (clock % 10_000.0 // 100.0) + clock % 100.0
+
+
+def fraction_unit(values: np.ndarray) -> str:
+    """Return the unit of fractions of a second (n,) that stand in a column of their own, by the largest of them."""
+    largest = np.nanmax(values, initial=0.0)
+    return "ms" if largest < 1e3 else "us" if largest < 1e6 else "ns"
 
 
 def over_midnight(clock: np.ndarray) -> np.ndarray:
@@ -157,6 +186,8 @@ def problem_of(time: np.ndarray, begins: Sequence[int], stride: int = 1) -> tupl
     same, back = np.flatnonzero(steps == 0.0), np.flatnonzero(steps < 0.0)
     if time.size < 2:
         return "it has fewer than two rows with a time", "Give a log with more."
+    if 2 * back.size > steps.size:
+        return "its clock runs backwards", "Say so in the map, and rows are put in order: [time] sort = true."
     if same.size > 1 and not back.size:
         why = f"{same.size} rows have the time of the row before: fractions of a second were not written"
         remedy = (

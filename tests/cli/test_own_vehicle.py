@@ -1,4 +1,4 @@
-"""docs/own_vehicle.md, line by line, with the log that it speaks of; what the page says of results is held to the files.
+"""docs/own_vehicle.md, line by line, with the log that it speaks of; what it says of results is held to the files.
 
 The log is measured, of a vehicle that no shipped model describes: the right verdict is that nothing is near.
 """

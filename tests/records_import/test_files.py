@@ -1,7 +1,7 @@
 """Logs that need a library: ArduPilot, MAVLink, PX4, MCAP and ROS, read, or named in one line.
 
-Verifies: `subzero.logs.files`, through `subzero.read_log`. Configuration: a vehicle that turns and dives, written by the
-libraries of these loggers, or byte by byte as their formats are specified. Tolerance: the digits of single precision.
+Verifies: `subzero.logs.files`, through `subzero.read_log`. Configuration: a vehicle that turns and dives, written by
+the libraries of these loggers, or byte by byte as their formats are specified. Tolerance: the digits of single precision.
 """
 
 from __future__ import annotations
@@ -262,7 +262,7 @@ def test_a_bag_whose_definitions_would_be_code_is_refused(tmp_path):
 def test_matlab_7_3_says_how_to_save_it(tmp_path):
     head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + struct.pack("<H", 0x0200) + b"IM"
     (tmp_path / "log.mat").write_bytes(head + b"\0" * 384 + b"\x89HDF\r\n\x1a\n")
-    with pytest.raises(UserError, match="version 7.3. In MATLAB: x = load"):
+    with pytest.raises(UserError, match=r"version 7\.3\. In MATLAB: x = load"):
         subzero.read_log(tmp_path / "log.mat")
 
 

@@ -78,6 +78,29 @@ def converted(factors, names):
     return text([[f"{value:.9g}" for value in row] for row in table], names)
 
 
+def clock(k, form="%Y-%m-%d %H:%M:%S.%f", start=(2026, 10, 25, 10, 0, 50)):
+    return (datetime.datetime(*start) + datetime.timedelta(seconds=STEP * k)).strftime(form)
+
+
+def spiked(rows, ahead):
+    return with_time(lambda k: f"{STEP * k + (ahead if k in rows else 0.0):.6g}")
+
+
+def held(columns):
+    """The record with some columns logged once a second, and straight lines in between."""
+    values = np.array(truth())
+    known = np.arange(0, ROWS, 10)
+    for at in columns:
+        values[at] = np.interp(np.arange(ROWS), known, values[at][known])
+    return text([[f"{value:.6g}" for value in row] for row in values.T])
+
+
+def in_two(first, second, make):
+    """The record with its time in two columns."""
+    return text([[*make(k), *row[1:]] for k, row in enumerate(cells())], [first, second, *COLUMNS[1:]])
+
+
+ARABIC = str.maketrans("0123456789", "٠١٢٣٤٥٦٧٨٩")
 RAD = np.pi / 180.0
 GERMAN = ["Zeit [s]", "Fahrt [m/s]", "Kurs [°]", "Drehrate [°/s]", "Pitch [°]", "Roll [°]", "Tiefe [m]"]
 READ = {
@@ -117,6 +140,19 @@ READ = {
         [1.0, 3600.0 / 1852.0, RAD, RAD, RAD, RAD, 1.0 / 0.3048],
         ["t", "Speed (kn)", "yaw_rad", "YawRate [rad/s]", "pitch_rad", "Roll(rad)", "depth[ft]"]),
     "MOOS": converted([1.0] * 7, ["TIME", "NAV_SPEED", "NAV_HEADING", *COLUMNS[3:6], "NAV_DEPTH"]),
+    "digits of Arabic": text([[cell.translate(ARABIC) for cell in row] for row in cells()]),
+    "delimiters behind rows": ",".join(COLUMNS) + "\n" + "".join(",".join(row) + ",\n" for row in cells()),
+    "two rows of names": "a,a,a,b,b,b,b\n" + text([["s", "m/s", "deg", "deg/s", "deg", "deg", "m"], *cells()]),
+    "day first": with_time(lambda k: clock(k, "%d/%m/%Y %H:%M:%S.%f")),
+    "month first": with_time(lambda k: clock(k, "%m/%d/%Y %I:%M:%S.%f %p")),
+    "month first, over the tenth": with_time(lambda k: clock(k, "%m/%d/%Y %H:%M:%S.%f", (2026, 10, 12, 23, 59, 50))),
+    "a day that can be a month": with_time(lambda k: clock(k, "%d/%m/%Y %H:%M:%S.%f", (2026, 4, 3, 10, 0, 50))),
+    "month in letters": with_time(lambda k: clock(k, "%d-%b-%Y %H:%M:%S.%f")),
+    "iso without signs": with_time(lambda k: clock(k, "%Y%m%dT%H%M%S.%fZ")),
+    "hhmmss": with_time(lambda k: clock(k, "%H%M%S.%f"), ["utc", *COLUMNS[1:]]),
+    "days of Excel": with_time(lambda k: f"{46320.4 + STEP * k / 86400.0:.12f}", ["time", *COLUMNS[1:]]),
+    "seconds and nanoseconds": in_two("sec", "nanosec", lambda k: (str(EPOCH + k // 10), str(k % 10 * 10**8))),
+    "seconds and microseconds": in_two("tv_sec", "tv_usec", lambda k: (str(k // 10), str(k % 10 * 10**5))),
     "angles decided by values": converted(
         [1.0, 1.0, RAD, RAD, RAD, RAD, 100.0],
         ["time", "speed_m_s", "yaw", "yawrate_rad_s", "pitch", "roll", "depth_cm"]),
@@ -131,6 +167,17 @@ NAMED = {
         with_time(lambda k: str(12_345_678 + k * 100_000)), "'time_s' (time): by its name in s, by its steps in us",
     ),
     "centidegrees": (converted([1, 1, 100, 1, 1, 1, 1], COLUMNS), "centidegree would do"),
+    "stamps ahead": (spiked((40, 97, 200), 0.15), "3 rows are not later than the row before, the first is row 42"),
+    "spikes of the clock": (spiked(range(20, 301, 60), 4.0), "5 rows are not later than the row before"),
+    "backwards": (with_time(lambda k: f"{30.0 - STEP * k:.6g}"), "its clock runs backwards. Say so in the map"),
+    "days or months first": (with_time(lambda k: clock(k, "%d/%m/%Y %H:%M:%S.%f", (2026, 4, 3, 23, 59, 50))),
+                             "'time_s' has dates of which nothing says whether the day or the month is first"),
+    "both orders": (with_time(lambda k: clock(k, ("%d/%m/%Y", "%m/%d/%Y")[k % 2] + " %H:%M:%S.%f")),
+                    "has dates with the day first and with the month first"),
+    "fractions that repeat the seconds": (in_two("sec", "nanosec", lambda k: (str(k // 10), str(k // 10))),
+                                          "rows have the time of the row before"),
+    "a list": (text([[f"{0.1 * (k // 3):.1f}", "depth_m", "2"] for k in range(90)], ["time", "name", "value"]),
+               "rows have the time of the row before"),
     "mixed zones": (with_time(lambda k: iso(k, zone=k % 2 == 0)), "some of its times have a zone and some have none"),
     "no unit": (converted([1.0] * 7, ["time", "speed", *COLUMNS[2:]]), "'speed' (surge_speed): in "),
     "no time": (text([row[1:] for row in cells()], COLUMNS[1:]), "none of its columns is a time"),
@@ -200,6 +247,47 @@ def test_latitude_and_longitude_become_metres(tmp_path):
         record = subzero.read_log(make(tmp_path / "log.csv", "time_s,lat,lon\n" + rows))
         assert_allclose(record.values["north"], north, rtol=1e-4, atol=0.02)
         assert_allclose(record.values["east"], east, rtol=1e-4, atol=0.02)
+
+
+@pytest.mark.parametrize("lines", ["{t},{lat},S,{lon},W\n", "{t},{lat}S,{lon}W\n"])
+def test_letters_are_the_signs_of_latitude_and_longitude(lines, tmp_path):
+    names = "time_s,lat,ns,lon,ew\n" if ",S" in lines else "time_s,lat,lon\n"
+    rows = [lines.format(t=k, lat=33.5 + 1e-5 * k, lon=70.25 + 1e-5 * k) for k in range(40)]
+    record = subzero.read_log(make(tmp_path / "log.csv", names + "".join(rows)))
+    assert record.values["north"][-1] < -40.0  # farther south
+    assert record.values["east"][-1] < -30.0  # farther west
+
+
+def test_what_was_interpolated_or_has_no_speed_is_read_all_the_same(tmp_path):
+    record = subzero.read_log(make(tmp_path / "log.csv", held([2])))
+    known = np.isfinite(record.values["heading"])
+    assert_allclose(record.values["heading"][known], truth()[2][known], atol=1e-3)
+    rows = "".join(f"{t:.1f},{3 * t:.3f},{-2 * t:.3f}\n" for t in truth()[0])
+    record = subzero.read_log(make(tmp_path / "log.csv", "time_s,north_m,east_m\n" + rows))
+    assert_allclose(record.values["north"], 3.0 * truth()[0], atol=1e-3)
+
+
+def test_a_heading_that_counts_on_over_three_turns_is_in_the_unit_of_its_name(tmp_path):
+    heading = np.linspace(2.0, 22.0, 60)
+    rows = "".join(f"{0.5 * k},{value:.6f}\n" for k, value in enumerate(heading))
+    record = subzero.read_log(make(tmp_path / "log.csv", "Time (s),Yaw (rad)\n" + rows))
+    assert_allclose(record.values["heading"], np.degrees(heading), atol=1e-3)
+
+
+def test_a_log_with_more_rows_than_a_record_can_have_keeps_every_nth(tmp_path, monkeypatch):
+    from subzero.logs import text as module
+
+    monkeypatch.setattr(module, "MOST_ROWS", 50)
+    monkeypatch.setattr(module, "CHUNK", 7)
+    content = text([[*row, "word"] for row in cells()], [*COLUMNS, "mode"])
+    record = subzero.read_log(make(tmp_path / "log.csv", content))
+    stride = round(ROWS / record.time.size)
+    assert 6 <= stride <= 8
+    hold(record, rows=slice(None, None, stride))
+    assert f"Of {stride} rows one is kept, {record.time.size} in all." in record.notes
+    turns = [[f"{0.1 * k:.1f}", "1" if k % 2 else "", "" if k % 2 else "2"] for k in range(300)]
+    with pytest.raises(UserError, match="which hold sensors in turn"):
+        subzero.read_log(make(tmp_path / "log.csv", text(turns, ["time_s", "depth_m", "surge_speed_m_s"])))
 
 
 def test_of_two_pressure_sensors_the_one_that_dives_is_taken_and_it_is_said(tmp_path):
@@ -321,7 +409,7 @@ def test_a_log_of_ardupilot_is_read_without_the_barometer_in_the_hull():
     assert "BARO[0].Alt" not in lines
     assert any("BARO[0].Alt" in note and "inside the hull" in note for note in found.record.notes)
     assert any(
-        note.startswith("RCOU.C1 to ") and "the pulse of a motor" in note for note in found.record.notes
+        "to RCOU.C14 (" in note and "the pulse of a motor" in note for note in found.record.notes
     )
     assert lines["ATT.Yaw"].unit == "degree"
 
