@@ -106,7 +106,7 @@ def find_clock(table: Table) -> tuple[Clock, tuple[str, ...]]:
         return Clock(columns=tuple(clocks), reason="date and time of day"[0 if len(clocks) == 2 else 9 :]), ()
     if not named:
         why = f"none of its columns is a time: {', '.join(map(short, table.columns))}"
-        remedy = 'Name it in the map: [time] columns = ["NAME"], unit = "s", or say how far rows are apart: every_s = 0.1.'
+        remedy = 'Say in the map which: [time] columns = ["NAME"], unit = "s", or how far rows are apart: every_s = 0.1.'
         raise refusal(table.source, why, remedy)
     name = min(named, key=lambda name: named[name].rank)
     if fractions := [other for other in named if _are_fractions(table, name, other)]:

@@ -1,7 +1,7 @@
 """Logs that need a library: ArduPilot, MAVLink, PX4, MCAP and ROS, read, or named in one line.
 
 Verifies: `subzero.logs.files`, through `subzero.read_log`. Configuration: a vehicle that turns and dives, written by
-the libraries of these loggers, or byte by byte as their formats are specified. Tolerance: the digits of single precision.
+the libraries of these loggers, or byte by byte as their formats are specified. Tolerance: single precision.
 """
 
 from __future__ import annotations
