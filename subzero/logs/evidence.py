@@ -193,7 +193,9 @@ def _possible(columns: Mapping[str, Measured], variables: Mapping[str, str]) -> 
 
 def _counts_turns(column: Measured) -> bool:
     """Say whether a column is a heading that its name has in radians or degrees, and that counts on over some turns."""
-    turn = {"rad": 2.0 * math.pi, "degree": 360.0}.get(column.unit, 0.0) if column.channel == "heading" else 0.0
+    turn = (
+        {"rad": 2.0 * math.pi, "degree": 360.0}.get(column.unit, 0.0) if column.channel == "heading" else 0.0
+    )
     return bool(np.nanmax(np.abs(column.values)) <= MOST_TURNS * turn)
 
 

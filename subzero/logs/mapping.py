@@ -106,7 +106,9 @@ def find_clock(table: Table) -> tuple[Clock, tuple[str, ...]]:
         return Clock(columns=tuple(clocks), reason="date and time of day"[0 if len(clocks) == 2 else 9 :]), ()
     if not named:
         why = f"none of its columns is a time: {', '.join(map(short, table.columns))}"
-        remedy = 'Say in the map which: [time] columns = ["NAME"], unit = "s", or how far rows are apart: every_s = 0.1.'
+        remedy = (
+            'Say in the map: [time] columns = ["NAME"], unit = "s", or how far rows are apart: every_s = 0.1.'
+        )
         raise refusal(table.source, why, remedy)
     name = min(named, key=lambda name: named[name].rank)
     if fractions := [other for other in named if _are_fractions(table, name, other)]:
@@ -122,7 +124,9 @@ def _is_time(table: Table, name: str) -> Named | None:
 
 def _are_fractions(table: Table, name: str, other: str) -> bool:
     """Say whether the fractions of a clock in whole seconds stand in another column, as its name and numbers say."""
-    both = [column.values[np.isfinite(column.values)] for column in (table.columns[name], table.columns[other])]
+    both = [
+        column.values[np.isfinite(column.values)] for column in (table.columns[name], table.columns[other])
+    ]
     named = recognised(other)
     is_whole = all(values.size and np.all(values == np.round(values)) for values in both)
     return bool(is_whole and named and named.unit in ("us", "ns") and both[1].max() < 1e9 and np.ptp(both[1]) > 0.0

@@ -146,7 +146,9 @@ def _layout(path: Path, lines: list[str]) -> _Layout:
     delimiter, decimal = max(FORMATS, key=lambda kind: _fit(plain, *kind))
     width = _width([_cells(line, delimiter) for line in plain])
     rows = [(at, _cells(line.lstrip("#%/ "), delimiter), line.startswith(REMARKS)) for at, line in written]
-    if all(not row[-1] for _, row, _ in rows if len(row) == width):  # a delimiter behind each row, but for the names
+    if all(
+        not row[-1] for _, row, _ in rows if len(row) == width
+    ):  # a delimiter behind each row, but for the names
         rows = [(at, [*row, ""] if len(row) == width - 1 else row, is_remark) for at, row, is_remark in rows]
     full = [(at, row, is_remark) for at, row, is_remark in rows if len(row) == width]
     is_data = [not is_remark and _has_numbers(row, decimal) for _, row, is_remark in full]

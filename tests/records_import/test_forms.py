@@ -408,9 +408,7 @@ def test_a_log_of_ardupilot_is_read_without_the_barometer_in_the_hull():
     assert lines["CTUN.BAlt"].channel == "depth"
     assert "BARO[0].Alt" not in lines
     assert any("BARO[0].Alt" in note and "inside the hull" in note for note in found.record.notes)
-    assert any(
-        "to RCOU.C14 (" in note and "the pulse of a motor" in note for note in found.record.notes
-    )
+    assert any("to RCOU.C14 (" in note and "the pulse of a motor" in note for note in found.record.notes)
     assert lines["ATT.Yaw"].unit == "degree"
 
 
