@@ -4,7 +4,7 @@ Both logs are put on one grid, and for every lag τ at which they overlap by hal
 
     ρ(τ) = Σ cov(x, y; τ) / √(Σ var(x; τ) · Σ var(y; τ)),   sums over the channels, each in units of its deviation
 
-so that no bias of a sensor counts. The offset of the clocks is where ρ is largest, by a parabola through what is near it,
+so that no bias of a sensor counts. The offset of the clocks is where ρ is largest, by a parabola through what is near,
 with the Cramér-Rao bound of a delay, σ² = (1 − ρ²) / (N · |ρ″|). Left out: clocks that drift.
 """
 

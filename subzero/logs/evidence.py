@@ -193,9 +193,7 @@ def _possible(columns: Mapping[str, Measured], variables: Mapping[str, str]) -> 
 
 def _counts_turns(column: Measured) -> bool:
     """Say whether a column is a heading that its name has in radians or degrees, and that counts on over some turns."""
-    turn = (
-        {"rad": 2.0 * math.pi, "degree": 360.0}.get(column.unit, 0.0) if column.channel == "heading" else 0.0
-    )
+    turn = {"rad": 2.0 * math.pi, "degree": 360.0}.get(column.unit, 0.0) * (column.channel == "heading")
     return bool(np.nanmax(np.abs(column.values)) <= MOST_TURNS * turn)
 
 
@@ -207,9 +205,8 @@ def _circle(loose: Sequence[Measured]) -> str:
     """
     sizes = [(np.nanmax(np.abs(angle.values)), LARGEST_ANGLES.get(angle.channel, math.pi)) for angle in loose]
     if all(size <= 1.01 * most for size, most in sizes):
-        spans = [
-            np.ptp(angle.values[np.isfinite(angle.values)]) for angle in loose if angle.channel == "heading"
-        ]
+        headings = [angle.values[np.isfinite(angle.values)] for angle in loose if angle.channel == "heading"]
+        spans = [np.ptp(heading) for heading in headings]
         return "rad" if spans and spans[0] > QUARTER_TURN else ""
     return "degree" if max(size for size, _ in sizes) <= LIMITS["degree"] else "centidegree"
 
@@ -217,12 +214,10 @@ def _circle(loose: Sequence[Measured]) -> str:
 def _slope(tie: Tie, columns: Mapping[str, Measured], time: np.ndarray) -> _Slope | None:
     """Return the slope of a tie where both sides are measured and as good as proportional."""
     lefts = (tie.left, "east") if tie.left == "north" else (tie.left,)
-    if (
-        any(name not in columns for name in (*lefts, *tie.right))
-        or len({columns[name].unit for name in lefts}) > 1
-    ):
+    names = (*lefts, *tie.right)
+    if not columns.keys() >= set(names) or len({columns[name].unit for name in lefts}) > 1:
         return None
-    series = {name: _filled(columns[name], time) for name in (*lefts, *tie.right)}
+    series = {name: _filled(columns[name], time) for name in names}
     known = np.all([np.isfinite(values) for values in series.values()], axis=0)
     if known.sum() < FEWEST_ROWS:
         return None

@@ -47,19 +47,11 @@ DATAFLASH = b"\xa3\x95"
 EARTH_FRAMES = ("map", "odom", "world", "earth")
 """Frames of ROS (REP 105) in which a velocity is none of the body."""
 ROS_AXES = {
-    "position": (("east", "x", 1.0, "m"), ("north", "y", 1.0, "m"), ("depth", "z", -1.0, "m")),
-    "linear": (
-        ("surge_speed", "x", 1.0, "m/s"),
-        ("sway_speed", "y", -1.0, "m/s"),
-        ("heave_speed", "z", -1.0, "m/s"),
-    ),
-    "angular": (
-        ("roll_rate", "x", 1.0, "rad/s"),
-        ("pitch_rate", "y", -1.0, "rad/s"),
-        ("yaw_rate", "z", -1.0, "rad/s"),
-    ),
+    "position": (("east", "north", "depth"), (1.0, 1.0, -1.0), "m"),
+    "linear": (("surge_speed", "sway_speed", "heave_speed"), (1.0, -1.0, -1.0), "m/s"),
+    "angular": (("roll_rate", "pitch_rate", "yaw_rate"), (1.0, -1.0, -1.0), "rad/s"),
 }
-"""Vector in a message → channel, part, sign in the axes of ROS, and unit."""
+"""Vector in a message → channels of its parts x, y, z, their signs in the axes of ROS, and their unit."""
 OF_ROS = "Its axes are those of ROS: east, north, up and forward, left, up become north, east, down."
 
 Notes = list[str]
@@ -342,8 +334,9 @@ def _fields(path: str, value: Any, is_ned: bool, is_of_body: bool) -> Iterator[t
         for name, angle in zip(("roll", "pitch", "heading"), angles, strict=True):
             yield name, "rad", float(angle), not is_ned
     elif kind in ROS_AXES and {"x", "y", "z"} <= set(parts) and (is_of_body or kind == "position"):
-        for (name, part, sign, unit), ned in zip(ROS_AXES[kind], "yxz", strict=True):
-            part = ned if is_ned and kind == "position" else part
+        names, signs, unit = ROS_AXES[kind]
+        order = "yxz" if is_ned and kind == "position" else "xyz"  # x is north there
+        for name, part, sign in zip(names, order, signs, strict=True):
             yield name, unit, float(parts[part]) * (1.0 if is_ned else sign), not is_ned
     elif isinstance(value, int | float) and not isinstance(value, bool):
         yield path, "", float(value), False

@@ -167,9 +167,7 @@ def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> 
     used = {
         name: named[name] for name, why in chosen.items() if why != RIVAL and not why.startswith("not used")
     }
-    columns = {
-        found.channel: Measured(found.channel, values[name], found.unit) for name, found in used.items()
-    }
+    columns = {use.channel: Measured(use.channel, values[name], use.unit) for name, use in used.items()}
     said = findings({**_positions(columns), **columns}, time)
     lines = {name: _unused(table, name, chosen) for name in table.columns if name not in clock.columns}
     lines |= {name: Line(name=name, channel=named[name].channel, unit=named[name].unit or ASKED, reason=RIVAL)
@@ -177,10 +175,9 @@ def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> 
     lines |= {name: _line(name, found, said, chosen[name]) for name, found in used.items()}
     questions += [_question(lines[name], said) for name in used if lines[name].unit == ASKED]
     names = {found.channel: lines[name] for name, found in used.items()}
-    odd = [_words(tie, names) for tie in said.contradictions if tie.channels[0] in names]
-    is_asked = [tie.is_of_units for tie in said.contradictions if tie.channels[0] in names]
-    questions += [words for words, asked in zip(odd, is_asked, strict=True) if asked]
-    notes = tuple(words for words, asked in zip(odd, is_asked, strict=True) if not asked)
+    odd = [(tie.is_of_units, _words(tie, names)) for tie in said.contradictions if tie.channels[0] in names]
+    questions += [words for is_asked, words in odd if is_asked]
+    notes = tuple(words for is_asked, words in odd if not is_asked)
     return Map(clock=clock, lines=tuple(lines.values()), questions=tuple(questions), notes=notes)
 
 
@@ -207,17 +204,13 @@ def _unused(table: Table, name: str, chosen: Mapping[str, str]) -> Line:
 def _line(name: str, named: Named, found: Findings, choice: str) -> Line:
     """Return the line of a column whose unit is stated, decided by values, or asked."""
     units, agrees = found.units[named.channel], found.agrees[named.channel]
-    why = (
-        [choice, named.reason if named.unit else "by its values"]
-        if choice
-        else [named.reason if named.unit else "by its values"]
-    )
+    why = [choice] if choice else []
+    why += [named.reason if named.unit else "by its values"]
     why += [f"agrees with the {' and the '.join(dict.fromkeys(agrees))}"] if agrees else []
     line = Line(name=name, channel=named.channel, unit=named.unit, reason="; ".join(why))
     if named.unit:
-        return replace(
-            line, unit=named.unit if named.unit in units or agrees else ASKED, is_open=units != [named.unit]
-        )
+        unit = named.unit if named.unit in units or agrees else ASKED
+        return replace(line, unit=unit, is_open=units != [named.unit])
     return replace(line, unit=units[0]) if len(units) == 1 else replace(line, unit=ASKED, reason="asked")
 
 
@@ -275,10 +268,8 @@ def _best_of(
         return rivals[0], ""
     others = {found.channel: Measured(found.channel, values[name]) for name, found in named.items()}
     channel = named[rivals[0]].channel
-    agreeing = [
-        name for name in rivals if tied(channel, {**others, channel: Measured(channel, values[name])}, time)
-    ]
-    best = agreeing or list(rivals)
+    measured = {name: {**others, channel: Measured(channel, values[name])} for name in rivals}
+    best = [name for name in rivals if tied(channel, measured[name], time)] or list(rivals)
     if all(_are_alike(values[best[0]], values[name]) for name in best[1:]):
         odd, same = [name for name in rivals if name not in best], ", ".join(map(short, best[1:]))
         words = [f"as good as {same}"] if same else []
@@ -290,11 +281,10 @@ def _best_of(
 def _are_alike(first: np.ndarray, second: np.ndarray) -> bool:
     """Say whether two columns change alike, by as much."""
     known = np.isfinite(first) & np.isfinite(second)
-    a, b = (
-        values[known] - values[known].mean() if known.any() else values[known] for values in (first, second)
-    )
-    size = float(a @ a + b @ b)
-    return bool(known.any()) and 2.0 * float(a @ b) >= ALIKE * size
+    if not known.any():
+        return False
+    a, b = (values[known] - values[known].mean() for values in (first, second))
+    return 2.0 * float(a @ b) >= ALIKE * float(a @ a + b @ b)
 
 
 def _positions(columns: Mapping[str, Measured]) -> dict[str, Measured]:
@@ -305,10 +295,7 @@ def _positions(columns: Mapping[str, Measured]) -> dict[str, Measured]:
     if len(places) < 2 or not all(units):
         return {}
     metres = north_and_east([place.values for place in places], units)
-    return {
-        name: Measured(name, values, "m", True)
-        for name, values in zip(("north", "east"), metres, strict=True)
-    }
+    return {name: Measured(name, way, "m", True) for name, way in zip(("north", "east"), metres, strict=True)}
 
 
 def north_and_east(places: Sequence[np.ndarray], units: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:

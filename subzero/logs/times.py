@@ -98,10 +98,9 @@ def form_of(forms: Counter[str]) -> str:
     plain = Counter[str]()
     for form, count in forms.items():
         plain[form.partition(", ")[0]] += count
-    orders = {form[form.index(", ") :] for form in forms if ", " in form} - {EITHER}
-    order = (
-        BOTH if len(orders) > 1 else orders.pop() if orders else EITHER * any(", " in form for form in forms)
-    )
+    orders = {form[form.index(", ") :] for form in forms if ", " in form}
+    clear = orders - {EITHER}
+    order = BOTH if len(clear) > 1 else (clear or orders or {""}).pop()
     is_mixed = MIXED in plain or all(form in plain for form in DATE_AND_TIME)
     return (MIXED if is_mixed else plain.most_common(1)[0][0]) + order
 
@@ -112,9 +111,8 @@ def in_order(values: np.ndarray, form: str) -> tuple[np.ndarray, str, str]:
     Dates that can be read in both ways were read with the day first; those that cannot say how all are meant. Nothing
     depends on it if all are one day.
     """
-    form, sign, order = form.partition(", ")
-    order = sign + order
-    days = np.floor(values / DAY)
+    order = form[len(form.partition(", ")[0]) :]
+    form, days = form.removesuffix(order), np.floor(values / DAY)
     if order == BOTH:
         return values, form, "has dates with the day first and with the month first"
     if order == EITHER and np.unique(days[np.isfinite(days)]).size > 1:
