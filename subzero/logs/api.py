@@ -124,7 +124,9 @@ def import_log(
     if not values:
         raise refusal(path, "no channel has a number in the rows that are used", "Look at its times.")
     notes = [*table.notes, *notes, *more, *mapping.notes, *_open_units(mapping)]
-    is_used = np.any([np.isfinite(column) for column in values.values()], axis=0)  # of messages, most rows are others'
+    is_used = np.any(
+        [np.isfinite(column) for column in values.values()], axis=0
+    )  # of messages, most rows are others'
     values = {name: column[is_used] for name, column in values.items()}
     record = Record(source=table.source, time=time[is_used], values=values, notes=tuple(notes))
     return Imported(source=table.source, mapping=mapping, record=record)

@@ -28,6 +28,8 @@ ASKED = "?"
 """Unit in a map that the user has to fill in."""
 RIVAL = "one of several with this channel"
 """Reason of a column that may be the one to be used."""
+ACROSS = "sway_speed", "heave_speed"
+"""Channels that one letter may mean, v and w, and that are only believed beside a speed ahead."""
 ALIKE = 0.98
 """Cosine between two columns from which on they measure the same. [-]"""
 EQUATOR_M, SQUARED_ECCENTRICITY = 6378137.0, 6.69437999014e-3
@@ -162,6 +164,8 @@ def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> 
         and np.isfinite(column.values[rows]).any()
         and (found.channel not in (LATITUDE, LONGITUDE) or np.nan_to_num(column.values[rows]).any())  # 0: no fix
     }  # fmt: skip
+    if "surge_speed" not in {found.channel for found in named.values()}:  # v may be the speed itself
+        named = {name: found for name, found in named.items() if found.channel not in ACROSS}
     values = {name: table.columns[name].values[rows] for name in named}
     chosen, questions = _chosen(named, values, time)
     used = {
@@ -194,6 +198,8 @@ def _unused(table: Table, name: str, chosen: Mapping[str, str]) -> Line:
     """Return the line of a column that is not used, and why."""
     column, named = table.columns[name], recognised(name)
     reason = f"not used: {reason_unused(name) or 'no channel has this name'}"
+    if named and named.channel in ACROSS:
+        reason = f"not used: a {named.channel}, of a log without a speed ahead; say in the map what it is"
     if column.form not in (NUMBER, TEXT) or (named and named.channel == TIME.name):
         reason = "not used: another time"
     if column.form == TEXT or (named and column.is_empty):

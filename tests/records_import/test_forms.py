@@ -306,6 +306,21 @@ def test_of_two_pressure_sensors_the_one_that_dives_is_taken_and_it_is_said(tmp_
     assert reasons["press[0]"] == "not used: 'press[1]' is the depth"
 
 
+def test_a_velocity_of_one_letter_alone_may_be_the_speed_and_is_not_used(tmp_path):
+    from subzero.logs.api import import_log
+
+    lines = "".join(f"{k},{1 + 0.1 * k},{3 - 0.05 * k:g}\n" for k in range(30))
+    table = {
+        row[0]: row for row in import_log(make(tmp_path / "log.csv", "t,depth_m,v[m/s]\n" + lines)).table()
+    }
+    assert table["v[m/s]"][1] == ""
+    assert "without a speed ahead; say in the map what it is" in table["v[m/s]"][4]
+    table = {
+        row[0]: row for row in import_log(make(tmp_path / "log.csv", "t,u_m_s,v[m/s]\n" + lines)).table()
+    }
+    assert table["v[m/s]"][1] == "sway_speed"
+
+
 def test_two_sensors_that_differ_are_asked_about(tmp_path):
     rows = "".join(f"{k},{1 + 0.1 * k},{3 - 0.2 * k:g}\n" for k in range(30))
     with pytest.raises(
