@@ -4,7 +4,7 @@ A reader gives columns of a file, or its messages as samples that each have thei
 whatever it raises, becomes one sentence. Attitudes that are quaternions become angles, and the axes of ROS (REP 103:
 east, north, up; forward, left, up) become north, east, down; both are said.
 
-No file executes code: rosbags compiles definitions of messages that stand in a bag, whose names are checked first.
+No file executes code: rosbags compiles the definitions of messages in a bag, in which its grammar allows names only.
 """
 
 from __future__ import annotations
@@ -290,15 +290,9 @@ def _mcap(path: Path, wanted: Wanted, notes: Notes) -> Iterator[Sample]:
 
 def _rosbag(path: Path, wanted: Wanted, notes: Notes) -> Iterator[Sample]:
     """Give the numbers of a ROS bag."""
-    from rosbags import rosbag1, rosbag2
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    with (rosbag1 if path.suffix == ".bag" else rosbag2).Reader(path) as raw:
-        if not all(
-            re.fullmatch(r"[A-Za-z]\w*(/[A-Za-z]\w*)+", link.msgtype, re.ASCII) for link in raw.connections
-        ):
-            raise refusal(path, "a type of its messages is no name", "Do not trust it.")
     with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag:
         for link, at, data in bag.messages():
             yield from _of_ros(link.topic, bag.deserialize(data, link.msgtype), 1e-9 * at, wanted, notes)
