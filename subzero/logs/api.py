@@ -28,7 +28,7 @@ from subzero.logs.names import (
     kind_of,
     recognised,
 )
-from subzero.logs.table import NUMBER, Progress, Table, refusal
+from subzero.logs.table import NUMBER, Progress, Table, names_of, refusal
 from subzero.records.record import LARGEST, Record, as_measured
 
 ONLY_NAMES = "taken from names; the values of the log alone would allow others too."
@@ -116,7 +116,7 @@ def import_log(
         rows, time, notes = _rows(path, table, mapping.clock)
         mapping = replace(mapping, notes=contradictions(mapping, table, rows, time))
     if not any(line.channel for line in mapping.lines) and not mapping.questions:
-        why = f"none of its columns is a channel: {', '.join(map(short, table.columns))}"
+        why = f"none of its columns is a channel: {names_of(table.columns)}"
         raise refusal(path, why, "Name them in a map, see docs/logs.md.")
     if mapping.questions:
         return Imported(source=table.source, mapping=mapping)
@@ -124,9 +124,7 @@ def import_log(
     if not values:
         raise refusal(path, "no channel has a number in the rows that are used", "Look at its times.")
     notes = [*table.notes, *notes, *more, *mapping.notes, *_open_units(mapping)]
-    is_used = np.any(
-        [np.isfinite(column) for column in values.values()], axis=0
-    )  # of messages, most rows are others'
+    is_used = np.any([np.isfinite(column) for column in values.values()], axis=0)  # most messages are others
     values = {name: column[is_used] for name, column in values.items()}
     record = Record(source=table.source, time=time[is_used], values=values, notes=tuple(notes))
     return Imported(source=table.source, mapping=mapping, record=record)
@@ -212,7 +210,7 @@ def _values(table: Table, mapping: Map, rows: np.ndarray) -> tuple[dict[str, np.
 
 def _open_units(mapping: Map) -> list[str]:
     """Return a sentence about units that only a name vouches for."""
-    names = ", ".join(short(line.name) for line in mapping.lines if line.is_open)
+    names = names_of(line.name for line in mapping.lines if line.is_open)
     return [f"Units of {names}: {ONLY_NAMES}"] if names else []
 
 

@@ -125,17 +125,15 @@ def _by_library(
 @contextlib.contextmanager
 def _silence() -> Iterator[IO[str]]:
     """Give a file that holds all that is printed meanwhile, also by machine code."""
-    with tempfile.TemporaryFile("w+") as said:
+    with tempfile.TemporaryFile("w+") as said, contextlib.ExitStack() as stack:
         with contextlib.suppress(OSError):  # a closed standard error
             kept = os.dup(2)
+            stack.callback(os.close, kept)
+            stack.callback(os.dup2, kept, 2)
             os.dup2(said.fileno(), 2)
-        try:
-            with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
-                yield said
-        finally:
-            if "kept" in locals():
-                os.dup2(kept, 2)
-                os.close(kept)
+        stack.enter_context(contextlib.redirect_stdout(said))
+        stack.enter_context(contextlib.redirect_stderr(said))
+        yield said
 
 
 def _some(names: list[str]) -> str:

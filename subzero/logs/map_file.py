@@ -25,7 +25,7 @@ from subzero.errors import UserError, listed, printable, real, short, suggestion
 from subzero.logs import times
 from subzero.logs.mapping import Clock, Line, Map
 from subzero.logs.names import CLOCK_UNITS, TARGETS, UNITS, kind_of, unit_of
-from subzero.logs.table import NUMBER, Table
+from subzero.logs.table import NUMBER, Table, names_of
 from subzero.user_file import MOST_OF_A_TOML, UnreadableFileError, read_text
 
 NUMBERS = int, float
@@ -190,5 +190,4 @@ def _read_line(name: str, entry: dict[str, Any]) -> Line:
 
 
 def _missing(name: object, table: Table) -> str:
-    have = ", ".join(map(short, table.columns))
-    return f"the log has no column {short(name)}.{suggestion(name, table.columns)} It has {have}"
+    return f"the log has no column {short(name)}.{suggestion(name, table.columns)} It has {names_of(table.columns)}"

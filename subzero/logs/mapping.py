@@ -22,7 +22,7 @@ from subzero.logs.names import (
     reason_unused,
     recognised,
 )
-from subzero.logs.table import NUMBER, TEXT, Table, refusal
+from subzero.logs.table import NUMBER, TEXT, Table, names_of, refusal
 
 ASKED = "?"
 """Unit in a map that the user has to fill in."""
@@ -107,7 +107,7 @@ def find_clock(table: Table) -> tuple[Clock, tuple[str, ...]]:
     if len(clocks) == 2 or (not named and times.TIME_OF_DAY in by_form):
         return Clock(columns=tuple(clocks), reason="date and time of day"[0 if len(clocks) == 2 else 9 :]), ()
     if not named:
-        why = f"none of its columns is a time: {', '.join(map(short, table.columns))}"
+        why = f"none of its columns is a time: {names_of(table.columns)}"
         remedy = (
             'Say in the map: [time] columns = ["NAME"], unit = "s", or how far rows are apart: every_s = 0.1.'
         )

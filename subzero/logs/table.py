@@ -20,6 +20,8 @@ from subzero.errors import UserError, printable, short
 NUMBER, TEXT = "number", "text"
 LARGEST = 1e19
 """Nothing that is logged is larger; nanoseconds since 1970 are 2e18."""
+MOST_NAMES = 12
+"""So many columns are named in a message."""
 SENTINELS = (9999.0, 99999.0)
 """Numbers, of either sign, that stand for a gap in a column whose other values are all less than half as large."""
 
@@ -77,6 +79,13 @@ class Sample(NamedTuple):
 def refusal(path: str | Path, why: str, remedy: str) -> UserError:
     """Return the error for a log that cannot be imported, in one line."""
     return UserError(f"The log {printable(str(path))} cannot be imported: {why}. {remedy}")
+
+
+def names_of(names: Iterable[str]) -> str:
+    """Return names of columns as a message shows them: the first ones, and how many more."""
+    shown = [short(name) for name in names]
+    rest = [f"{len(shown) - MOST_NAMES} more"] if len(shown) > MOST_NAMES else []
+    return ", ".join([*shown[:MOST_NAMES], *rest])
 
 
 def numbers(values: np.ndarray, form: str = NUMBER, unit: str = "") -> Column:

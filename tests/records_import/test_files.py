@@ -278,8 +278,8 @@ def test_matlab_7_3_says_how_to_save_it(tmp_path):
         subzero.read_log(tmp_path / "log.mat")
 
 
-MODULES = {"bin": "pymavlink.DFReader", "tlog": "pymavlink", "ulg": "pyulog", "mcap": "mcap.reader", "bag": "rosbags.highlevel",
-           "db3": "rosbags.highlevel"}  # fmt: skip
+MODULES = {"bin": "pymavlink.DFReader", "tlog": "pymavlink", "ulg": "pyulog", "mcap": "mcap.reader",
+           "bag": "rosbags.highlevel", "db3": "rosbags.highlevel"}  # fmt: skip
 
 
 @pytest.mark.parametrize("ending", MODULES)
