@@ -139,6 +139,9 @@ def _rows(path: str | Path, table: Table, clock: Clock) -> tuple[np.ndarray, np.
     seconds = _seconds(path, table, clock)
     rows = np.flatnonzero(np.isfinite(seconds))
     notes = [f"{size - rows.size} rows have no time and are left out."] if rows.size < size else []
+    if unset := times.first_after_setting(seconds[rows]):
+        rows = rows[unset:]
+        notes.append(f"{unset} rows before the clock was set are left out.")
     rows = rows[np.argsort(seconds[rows], kind="stable")] if clock.sort else rows
     begins = times.parts_of(seconds[rows])
     if clock.part:

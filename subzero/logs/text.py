@@ -294,12 +294,14 @@ def _with_hemispheres(columns: dict[str, Column]) -> list[str]:
     """Give latitudes and longitudes the signs of the letters in the column behind them, and say so."""
     notes = []
     for name, letters in itertools.pairwise(columns):
+        if columns[letters].form != HEMISPHERE:
+            continue
         found = recognised(name)
-        if columns[letters].form == HEMISPHERE and found and found.channel in (LATITUDE, LONGITUDE):
+        if found and found.channel in (LATITUDE, LONGITUDE):
             signed = np.abs(columns[name].values) * columns[letters].values
             columns[name] = replace(columns[name], values=signed)
-            columns[letters] = replace(columns[letters], form=TEXT)
             notes.append(f"{short(name)} has the signs of the letters in {short(letters)}.")
+        columns[letters] = replace(columns[letters], form=TEXT)
     return notes
 
 

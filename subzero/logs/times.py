@@ -19,11 +19,11 @@ from subzero.logs.names import CLOCK_UNITS
 
 DATE_AND_TIME = "date and time", "date and time with a zone"
 DATE, TIME_OF_DAY, MIXED = "date", "time of day", "dates with a zone and without"
-DAY = 86400.0
+DAY, YEAR = 86400.0, 3.2e7
 """[s]"""
 
 EPOCHS = {1e17: "ns", 1e14: "us", 1e11: "ms", 1e9: "s"}
-"""A first time beyond this counts from 1970 in that unit."""
+"""A time beyond this counts from 1970 in that unit."""
 
 DAYS = (4e4, 6e4), (7e5, 8e5)
 """Between these lie the days that Excel counts from 1900, and MATLAB from year 0, in this century."""
@@ -130,15 +130,16 @@ def unit_by_values(clock: np.ndarray) -> list[str]:
     known = clock[np.isfinite(clock)]
     if not known.size:
         return []
+    middle = float(np.median(known))  # the first rows may be of a clock that was not set yet
     for least, unit in EPOCHS.items():
-        if known[0] > least:
+        if middle > least:
             return [unit]
     steps = np.diff(known)
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
     low, high = STEP_LIMITS_S
     if _counts_in_sixties(known) and step < 40.0 and (np.abs(steps - step - 40.0) < step).any():
         return ["hhmmss"]
-    if any(least < known[0] < most for least, most in DAYS) and low <= step * DAY <= high:
+    if any(least < middle < most for least, most in DAYS) and low <= step * DAY <= high:
         return ["datenum"]
     return [unit for unit in ("s", "ms", "us", "ns") if low <= step * CLOCK_UNITS[unit] <= high]
 
@@ -169,7 +170,12 @@ def over_midnight(clock: np.ndarray) -> np.ndarray:
 
 def is_epoch(clock: np.ndarray) -> bool:
     """Say whether a clock counts from 1970."""
-    return bool(clock[np.isfinite(clock)][0] > min(EPOCHS))
+    return bool(np.nanmedian(clock) > min(EPOCHS))
+
+
+def first_after_setting(time: np.ndarray) -> int:
+    """Return the first row behind the last step of more than a year: before it, the clock was not set. 0 if none is."""
+    return int(np.flatnonzero(np.diff(time, prepend=time[:1]) > YEAR)[-1:].sum())
 
 
 def problem_of(time: np.ndarray, begins: Sequence[int], stride: int = 1) -> tuple[str, str] | None:

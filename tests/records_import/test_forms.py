@@ -306,6 +306,16 @@ def test_of_two_pressure_sensors_the_one_that_dives_is_taken_and_it_is_said(tmp_
     assert reasons["press[0]"] == "not used: 'press[1]' is the depth"
 
 
+def test_rows_before_the_clock_was_set_are_left_out_and_said(tmp_path):
+    """Slocum writes a row of sizes in byte below its units; a clock without a fix begins at 0."""
+    lines = [f"{EPOCH + STEP * k:.1f} {0.02 * k:.3f} {2.0 + 0.01 * k:.3f}" for k in range(60)]
+    head = ["m_present_time m_heading m_depth", "timestamp rad m", "8 4 4", "9.5 0 0"]
+    record = subzero.read_log(make(tmp_path / "log.csv", "\n".join([*head, *lines]) + "\n"))
+    assert_allclose(record.time, STEP * np.arange(60), atol=1e-5)
+    assert_allclose(record.values["depth"], 2.0 + 0.01 * np.arange(60))
+    assert "2 rows before the clock was set are left out." in record.notes
+
+
 def test_a_velocity_of_one_letter_alone_may_be_the_speed_and_is_not_used(tmp_path):
     from subzero.logs.api import import_log
 
