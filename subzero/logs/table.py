@@ -22,7 +22,7 @@ LARGEST = 1e19
 """Nothing that is logged is larger; nanoseconds since 1970 are 2e18."""
 MOST_NAMES = 12
 """So many columns are named in a message."""
-SENTINELS = (9999.0, 99999.0)
+SENTINELS = (99999.0, 65535.0, 32768.0, 32767.0, 9999.0, 999.0)
 """Numbers, of either sign, that stand for a gap in a column whose other values are all less than half as large."""
 
 Wanted = Callable[[str, str], bool]
@@ -115,13 +115,12 @@ def without_sentinels(columns: Mapping[str, Column]) -> tuple[dict[str, Column],
     """Return columns without numbers that stand for a gap, and a sentence about each of them."""
     found, notes = dict(columns), list[str]()
     for name, column in columns.items():
-        size = np.abs(column.values) if column.form == NUMBER else np.empty(0)
-        for sentinel in SENTINELS:
-            is_gap = size == sentinel
-            if (
-                is_gap.any()
-                and np.nanmax(size, where=~is_gap & np.isfinite(size), initial=0.0) < 0.5 * sentinel
-            ):
-                found[name] = replace(column, values=np.where(is_gap, np.nan, column.values))
+        values = column.values
+        for sentinel in SENTINELS if column.form == NUMBER else ():
+            is_gap, size = np.abs(values) == sentinel, np.abs(values)
+            others = np.max(size, where=np.isfinite(size) & ~is_gap, initial=0.0)
+            if is_gap.any() and others < 0.5 * sentinel:
+                values = np.where(is_gap, np.nan, values)
                 notes.append(f"{short(name)}: {is_gap.sum()} cells of ±{sentinel:g} are taken as gaps.")
+        found[name] = replace(column, values=values)
     return found, notes

@@ -218,17 +218,26 @@ def test_a_form_that_cannot_be_read_is_named_in_one_message(form, tmp_path):
     assert words in str(error.value)
 
 
-@pytest.mark.parametrize("word", ["NaN", "nan", "NULL", "#N/A", "-", "inf", '""', "-9999", "9999", ""])
+@pytest.mark.parametrize(
+    "word", ["NaN", "nan", "NULL", "#N/A", "-", "inf", '""', "-9999", "9999", "-999", "-32768", "65535", ""]
+)
 def test_words_and_numbers_for_nothing_are_gaps(word, tmp_path):
     record = subzero.read_log(make(tmp_path / "log.csv", with_gaps(word)))
     assert list(np.flatnonzero(np.isnan(record.values["depth"]))) == [5, 6, 50, 51, 52]
-    assert ("9999" in word) == any("taken as gaps" in note for note in record.notes)
+    assert word.lstrip("-").isdigit() == any("taken as gaps" in note for note in record.notes)
 
 
 def test_a_counter_that_passes_9999_has_no_gap_there(tmp_path):
     lines = "".join(f"{k},{9990 + k}\n" for k in range(30))
     record = subzero.read_log(make(tmp_path / "log.csv", "time_s,cable_length_m\n" + lines))
     assert np.isfinite(record.values["cable_length"]).all()
+
+
+def test_two_numbers_for_nothing_in_one_column_are_both_gaps(tmp_path):
+    rows = cells()
+    rows[5][6], rows[9][6] = "-999", "99999"
+    record = subzero.read_log(make(tmp_path / "log.csv", text(rows)))
+    assert list(np.flatnonzero(np.isnan(record.values["depth"]))) == [5, 9]
 
 
 def test_a_last_row_that_was_cut_off_is_left_out_and_said(tmp_path):
