@@ -14,6 +14,7 @@ from subzero.errors import short
 from subzero.logs import times
 from subzero.logs.evidence import Contradiction, Findings, Measured, findings, tied, units_by_size
 from subzero.logs.names import (
+    CLOCK_UNITS,
     LATITUDE,
     LONGITUDE,
     TARGETS,
@@ -137,7 +138,8 @@ def _are_fractions(table: Table, name: str, other: str) -> bool:
 
 def _clock_of_numbers(name: str, values: np.ndarray, written: str) -> tuple[Clock, tuple[str, ...]]:
     """Return the clock of a column of numbers, in the unit that is written if its size and steps allow that."""
-    likely, is_epoch = times.unit_by_values(values), times.is_epoch(values)
+    likely = times.unit_by_values(values)
+    is_epoch = len(likely) == 1 and np.nanmedian(values) * CLOCK_UNITS[likely[0]] > min(times.EPOCHS)
     if written and (written in likely or len(likely) != 1 or written in ("min", "h", "datenum")):
         return Clock(columns=(name,), unit=written, reason="unit in the name"), ()
     if len(likely) == 1 and (not written or is_epoch):

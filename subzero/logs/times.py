@@ -23,7 +23,8 @@ DAY, YEAR = 86400.0, 3.2e7
 """[s]"""
 
 EPOCHS = {1e17: "ns", 1e14: "us", 1e11: "ms", 1e9: "s"}
-"""A time beyond this counts from 1970 in that unit."""
+"""A time beyond this counts from 1970 in that unit, if its steps are shorter than the next."""
+LONGEST_STEP_S = 3600.0
 
 DAYS = (4e4, 6e4), (7e5, 8e5)
 """Between these lie the days that Excel counts from 1900, and MATLAB from year 0, in this century."""
@@ -130,12 +131,14 @@ def unit_by_values(clock: np.ndarray) -> list[str]:
     known = clock[np.isfinite(clock)]
     if not known.size:
         return []
-    middle = float(np.median(known))  # the first rows may be of a clock that was not set yet
-    for least, unit in EPOCHS.items():
-        if middle > least:
-            return [unit]
-    steps = np.diff(known)
+    steps, middle = (
+        np.diff(known),
+        float(np.median(known)),
+    )  # the first rows may be of a clock that was not set yet
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
+    for least, unit in EPOCHS.items():
+        if middle > least and step * CLOCK_UNITS[unit] < LONGEST_STEP_S:
+            return [unit]
     low, high = STEP_LIMITS_S
     if _counts_in_sixties(known) and step < 40.0 and (np.abs(steps - step - 40.0) < step).any():
         return ["hhmmss"]
@@ -166,11 +169,6 @@ def over_midnight(clock: np.ndarray) -> np.ndarray:
     days = np.zeros(clock.size)
     days[known[1:]] = np.cumsum(np.diff(clock[known]) < -0.5 * DAY)
     return clock + DAY * days
-
-
-def is_epoch(clock: np.ndarray) -> bool:
-    """Say whether a clock counts from 1970."""
-    return bool(np.nanmedian(clock) > min(EPOCHS))
 
 
 def first_after_setting(time: np.ndarray) -> int:

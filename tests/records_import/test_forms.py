@@ -125,6 +125,8 @@ READ = {
     "words": text([[*row, "manual"] for row in cells()], [*COLUMNS, "mode"]),
     "nanoseconds": with_time(lambda k: str(EPOCH * 10**9 + k * 10**8)),
     "milliseconds": with_time(lambda k: str(EPOCH * 1000 + k * 100), ["timestamp", *COLUMNS[1:]]),
+    "nanoseconds since a start": with_time(lambda k: str(5 * 10**12 + k * 10**8), ["timestamp_ns", *COLUMNS[1:]]),
+    "microseconds since a start": with_time(lambda k: str(5 * 10**9 + k * 10**5), ["time", *COLUMNS[1:]]),
     "seconds since 1970": with_time(lambda k: f"{EPOCH + STEP * k:.3f}", ["time", *COLUMNS[1:]]),
     "TimeUS": with_time(lambda k: str(12_345_678 + k * 100_000), ["TimeUS", *COLUMNS[1:]]),
     "six digits of an uptime": with_time(lambda k: f"{90274.5 + STEP * k:.6G}"),
