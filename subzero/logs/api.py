@@ -31,6 +31,8 @@ from subzero.logs.names import (
 from subzero.logs.table import NUMBER, Progress, Table, names_of, refusal
 from subzero.records.record import LARGEST, Record, as_measured
 
+AIR_M = 9.3, 10.9
+"""The pressure of air at the surface, as a depth in sea water. [m]"""
 ONLY_NAMES = "taken from names; the values of the log alone would allow others too."
 
 
@@ -207,6 +209,14 @@ def _values(table: Table, mapping: Map, rows: np.ndarray) -> tuple[dict[str, np.
         notes.append("North and east are metres from the first place, on the ellipsoid WGS 84.")
     if PRESSURE in lines:
         notes.append("Depth is by pressure, in sea water of 1025 kg/m³; an absolute one less 1013.25 hPa.")
+        gauge, (low, high) = lines[PRESSURE].unit, AIR_M
+        if (
+            f"{unit} absolute" in UNITS[PRESSURE]
+            and low < np.nanmin(values[TARGETS[PRESSURE]], initial=high) < high
+        ):
+            notes.append(
+                f"The least pressure is that of air: if it is absolute, say so in a map: {gauge} absolute."
+            )
     values = {name: np.where(np.abs(column) <= LARGEST, column, np.nan) for name, column in values.items()}
     return {name: column for name, column in values.items() if np.isfinite(column).any()}, notes
 

@@ -17,7 +17,7 @@ from subzero.channels import BY_NAME
 LATITUDE, LONGITUDE, PRESSURE = "latitude", "longitude", "pressure"
 TARGETS = {LATITUDE: "north", LONGITUDE: "east", PRESSURE: "depth"}
 """What is no channel itself → the channel that it becomes."""
-RARE = ("mm", "km", "mm/s", "mrad", "mrad/s", "psi")
+RARE = ("mm", "km", "mm/s", "mrad", "mrad/s", "psi", "dbar absolute", "bar absolute", "psi absolute")
 """Units that are only believed where a name says so."""
 BRACKET = r"[\[(]([^\])]*)[\])]?"
 """A unit in a name, or the number of an instance."""

@@ -342,6 +342,16 @@ def test_a_velocity_of_one_letter_alone_may_be_the_speed_and_is_not_used(tmp_pat
     assert table["v[m/s]"][1] == "sway_speed"
 
 
+def test_a_pressure_that_may_be_absolute_is_said(tmp_path):
+    for air, is_said in ((1.013, True), (0.0, False)):
+        rows = "".join(f"{k},{air + 0.01 * k:.4f}\n" for k in range(40))
+        record = subzero.read_log(make(tmp_path / "log.csv", "time_s,Pressure (bar)\n" + rows))
+        assert any("bar absolute" in note for note in record.notes) == is_said
+    rows = "".join(f"{k},{1.01325 + 0.1 * k:.5f}\n" for k in range(40))
+    record = subzero.read_log(make(tmp_path / "log.csv", "time_s,Pressure (bara)\n" + rows))
+    assert_allclose(record.values["depth"], 9.945049 * 0.1 * np.arange(40), atol=1e-3)
+
+
 def test_two_sensors_that_differ_are_asked_about(tmp_path):
     rows = "".join(f"{k},{1 + 0.1 * k},{3 - 0.2 * k:g}\n" for k in range(30))
     with pytest.raises(
