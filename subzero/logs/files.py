@@ -320,7 +320,7 @@ def _parts(value: Any) -> dict[str, Any]:
 def _fields(path: str, value: Any, is_ned: bool, is_of_body: bool) -> Iterator[tuple[str, str, float, bool]]:
     """Give name, unit and value of the numbers in a message, and whether axes were turned."""
     parts, kind = _parts(value), path.rpartition(".")[2].removesuffix("_velocity")
-    if {"x", "y", "z", "w"} <= set(parts):
+    if {"x", "y", "z", "w"} <= set(parts) and kind != "rotation":  # of one frame of many, to another
         roll, pitch, yaw = angles_of(*(float(parts[name]) for name in "wxyz"))
         angles = (roll, pitch, yaw) if is_ned else (roll, -pitch, (0.5 * math.pi - yaw) % (2.0 * math.pi))
         for name, angle in zip(("roll", "pitch", "heading"), angles, strict=True):
@@ -332,7 +332,7 @@ def _fields(path: str, value: Any, is_ned: bool, is_of_body: bool) -> Iterator[t
             yield name, unit, float(parts[part]) * (1.0 if is_ned else sign), not is_ned
     elif isinstance(value, int | float) and not isinstance(value, bool):
         yield path, "", float(value), False
-    for name, inner in parts.items() if kind not in ROS_AXES else ():
+    for name, inner in parts.items() if kind not in (*ROS_AXES, "rotation") else ():
         yield from _fields(f"{path}.{name}".lstrip("."), inner, is_ned, is_of_body)
 
 

@@ -157,6 +157,7 @@ def mcap_of_json(path):
                 }
             }
             ns = int(1e9 * (EPOCH + at))
+            body["arm"] = {"child_frame_id": "arm", "rotation": {"x": 0, "y": 0, "z": 1, "w": 0}}
             for topic, message in zip(topics, (body, wanted), strict=True):
                 log.add_message(topic, log_time=ns, publish_time=ns, data=json.dumps(message).encode())
             log.add_message(other, log_time=ns, publish_time=ns, data=b"?")
