@@ -30,7 +30,7 @@ ASKED = "?"
 RIVAL = "one of several with this channel"
 """Reason of a column that may be the one to be used."""
 ACROSS = "sway_speed", "heave_speed"
-"""Channels that one letter may mean, v and w, and that are only believed beside a speed ahead."""
+"""Channels that one letter may mean, v and w, and that are taken only with a speed ahead."""
 ALIKE = 0.98
 """Cosine between two columns from which on they measure the same. [-]"""
 EQUATOR_M, SQUARED_ECCENTRICITY = 6378137.0, 6.69437999014e-3
