@@ -15,19 +15,25 @@ from subzero.arguments import checked_arguments
 from subzero.channels import BY_NAME, TIME
 from subzero.errors import SHOWN_PROBLEMS, UserError, listed, printable, short
 from subzero.logs import times
-from subzero.logs.mapping import (
-    ASKED,
-    Clock,
-    Map,
-    contradictions,
-    find_clock,
-    find_map,
-    north_and_east,
-    read_map,
+from subzero.logs.files import read_table
+from subzero.logs.map_file import map_content, read_map
+from subzero.logs.mapping import ASKED, Clock, Map, contradictions, find_clock, find_map, north_and_east
+from subzero.logs.names import (
+    CLOCK_UNITS,
+    LATITUDE,
+    LONGITUDE,
+    PRESSURE,
+    TARGETS,
+    UNITS,
+    kind_of,
+    recognised,
 )
-from subzero.logs.names import CLOCK_UNITS, LATITUDE, LONGITUDE, PRESSURE, TARGETS, UNITS, kind_of
-from subzero.logs.table import Table, read_table, refusal
+from subzero.logs.table import NUMBER, Progress, Table, names_of, refusal
 from subzero.records.record import LARGEST, Record, as_measured
+
+AIR_M = 9.3, 10.9
+"""The pressure of air at the surface, as a depth in sea water. [m]"""
+ONLY_NAMES = "taken from names; the values of the log alone would allow others too."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,8 +71,8 @@ def read_log(path: str | Path, map: str | Path | None = None) -> Record:
     do not decide has to be said by a map (``subzero import LOG --map-out map.toml`` writes one to edit).
 
     Args:
-        path: CSV of any delimiter and encoding, ``.mat``, netCDF ``.nc``, MOOS ``.alog``, or ArduPilot ``.bin``
-            (with the extra ``logs``).
+        path: CSV of any delimiter and encoding, ``.mat``, netCDF ``.nc``, MOOS ``.alog``; with the extra ``logs``
+            ArduPilot ``.bin`` and ``.tlog``, PX4 ``.ulg``, ``.mcap``, and ROS ``.bag`` and ``.db3``.
         map: TOML file that says which column is which channel, in which unit; found if None.
 
     Raises:
@@ -86,34 +92,43 @@ def undecided(found: Imported) -> UserError:
     return UserError(listed(title, [*questions[: SHOWN_PROBLEMS - 1], remedy]))
 
 
-def import_log(path: str | Path, map_path: str | Path | None = None) -> Imported:
+def import_log(
+    path: str | Path, map_path: str | Path | None = None, progress: Progress = lambda _: None
+) -> Imported:
     """Read a log with the map that is given or found.
+
+    Args:
+        path: the log.
+        map_path: the map.
+        progress: called with the share of the file that is read.
 
     Raises:
         UserError: it cannot be read, or the map does not suit.
     """
-    table = read_table(path)
     if map_path is None:
+        table = read_table(path, lambda name, unit: recognised(name, unit) is not None, progress)
         clock, questions = find_clock(table)
         rows, time, notes = _rows(path, table, clock)
         mapping = find_map(table, clock, rows, time)
         mapping = replace(mapping, questions=(*questions, *mapping.questions))
     else:
-        mapping = read_map(map_path, table)
+        content, names = map_content(map_path)
+        table = read_table(path, lambda name, unit: name in names, progress)
+        mapping = read_map(map_path, content, table)
         rows, time, notes = _rows(path, table, mapping.clock)
         mapping = replace(mapping, notes=contradictions(mapping, table, rows, time))
     if not any(line.channel for line in mapping.lines) and not mapping.questions:
-        names = ", ".join(short(name) for name in table.columns)
-        raise refusal(
-            path, f"none of its columns is a channel: {names}", "Name them in a map, see docs/logs.md."
-        )
+        why = f"none of its columns is a channel: {names_of(table.columns)}"
+        raise refusal(path, why, "Name them in a map, see docs/logs.md.")
     if mapping.questions:
         return Imported(source=table.source, mapping=mapping)
     values, more = _values(table, mapping, rows)
     if not values:
         raise refusal(path, "no channel has a number in the rows that are used", "Look at its times.")
     notes = [*table.notes, *notes, *more, *mapping.notes, *_open_units(mapping)]
-    record = Record(source=table.source, time=time, values=values, notes=tuple(notes))
+    is_used = np.any([np.isfinite(column) for column in values.values()], axis=0)  # most messages are others
+    values = {name: column[is_used] for name, column in values.items()}
+    record = Record(source=table.source, time=time[is_used], values=values, notes=tuple(notes))
     return Imported(source=table.source, mapping=mapping, record=record)
 
 
@@ -121,25 +136,24 @@ def _rows(path: str | Path, table: Table, clock: Clock) -> tuple[np.ndarray, np.
     """Return the rows that are used, in the order of time, their times from t = 0 on [s], and what was done."""
     size = next(iter(table.columns.values())).values.size
     if not clock.columns:
-        return (
-            np.arange(size),
-            clock.every_s * np.arange(size),
-            [f"Times: a row every {clock.every_s:g} s, by the map."],
-        )
+        notes = [f"Times: a row every {clock.every_s:g} s, by the map."]
+        return np.arange(size), clock.every_s * table.stride * np.arange(size), notes
     seconds = _seconds(path, table, clock)
     rows = np.flatnonzero(np.isfinite(seconds))
     notes = [f"{size - rows.size} rows have no time and are left out."] if rows.size < size else []
+    if unset := times.first_after_setting(seconds[rows]):
+        rows = rows[unset:]
+        notes.append(f"{unset} rows before the clock was set are left out.")
     rows = rows[np.argsort(seconds[rows], kind="stable")] if clock.sort else rows
     begins = times.parts_of(seconds[rows])
     if clock.part:
         if not 0 < clock.part <= len(begins):
-            raise refusal(
-                path, f"the map asks for part {clock.part}, and its clock has {len(begins)}", "Correct it."
-            )
+            why = f"the map asks for part {clock.part}, and its clock has {len(begins)}"
+            raise refusal(path, why, "Correct it.")
         rows = rows[begins[clock.part - 1] : [*begins, rows.size][clock.part]]
         notes.append(f"Part {clock.part} of {len(begins)} is used: {rows.size} of {size} rows.")
         begins = [0]
-    if problem := times.problem_of(seconds[rows], begins):
+    if problem := times.problem_of(seconds[rows], begins, table.stride):
         raise refusal(path, *problem)
     return _from_start(path, clock, rows, seconds[rows], notes)
 
@@ -149,7 +163,11 @@ def _seconds(path: str | Path, table: Table, clock: Clock) -> np.ndarray:
     columns = [table.columns[name] for name in clock.columns]
     if any(column.form == times.MIXED for column in columns):
         raise refusal(path, "some of its times have a zone and some have none", "Write all of them with one.")
+    if len(columns) == 2 and columns[1].form == NUMBER:
+        return columns[0].values + columns[1].values * CLOCK_UNITS[times.fraction_unit(columns[1].values)]
     total: np.ndarray = np.sum([column.values for column in columns], axis=0)
+    if clock.unit == "hhmmss":
+        return times.over_midnight(times.seconds_of_digits(total))
     if [column.form for column in columns] == [times.TIME_OF_DAY]:
         return times.over_midnight(total)
     likely = [*times.unit_by_values(total), "s"][0] if clock.unit == ASKED else clock.unit or "s"
@@ -166,9 +184,8 @@ def _from_start(
         start = given if isinstance(clock.start, str) else given * CLOCK_UNITS[clock.unit or "s"]
     kept = seconds >= start
     if kept.sum() < 2:
-        raise refusal(
-            path, f"the start in the map, {short(clock.start)}, leaves fewer than two rows", "Correct it."
-        )
+        why = f"the start in the map, {short(clock.start)}, leaves fewer than two rows"
+        raise refusal(path, why, "Correct it.")
     notes += [] if kept.all() else [f"{(~kept).sum()} rows before the start are left out."]
     if start != 0.0:
         whose = "the first time of the log" if clock.start is None else "the start in the map"
@@ -192,18 +209,22 @@ def _values(table: Table, mapping: Map, rows: np.ndarray) -> tuple[dict[str, np.
         notes.append("North and east are metres from the first place, on the ellipsoid WGS 84.")
     if PRESSURE in lines:
         notes.append("Depth is by pressure, in sea water of 1025 kg/m³; an absolute one less 1013.25 hPa.")
+        absolute, least = (
+            f"{lines[PRESSURE].unit} absolute",
+            np.nanmin(values[TARGETS[PRESSURE]], initial=AIR_M[1]),
+        )
+        if absolute in UNITS[PRESSURE] and AIR_M[0] < least < AIR_M[1]:
+            notes.append(
+                f"The least pressure is that of air: if it is absolute, say so in a map: unit = {absolute!r}."
+            )
     values = {name: np.where(np.abs(column) <= LARGEST, column, np.nan) for name, column in values.items()}
     return {name: column for name, column in values.items() if np.isfinite(column).any()}, notes
 
 
 def _open_units(mapping: Map) -> list[str]:
     """Return a sentence about units that only a name vouches for."""
-    names = ", ".join(short(line.name) for line in mapping.lines if line.is_open)
-    return (
-        [f"Units of {names}: taken from names; the values of the log alone would allow others too."]
-        if names
-        else []
-    )
+    names = names_of(line.name for line in mapping.lines if line.is_open)
+    return [f"Units of {names}: {ONLY_NAMES}"] if names else []
 
 
 def to_csv(record: Record) -> str:

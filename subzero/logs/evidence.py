@@ -35,6 +35,8 @@ SURFACE_M = 1.0
 """A vehicle is not above the surface, but for the zero of its sensor. [m]"""
 LARGEST_ANGLES = {"heading": 2.0 * math.pi, "pitch": 0.5 * math.pi, "roll_angle": math.pi}
 """Channel → the largest angle that it has on a circle. [rad]"""
+MOST_TURNS = 10.0
+"""A heading that counts on has turned no more often. [-]"""
 QUARTER_TURN = 0.5 * math.pi
 FAMILIES = {"degree": "angles", "degree/s": "rates", LATITUDE: "places", LONGITUDE: "places"}
 """Units of a kind that are the same in all columns of a log whose names say none; so are those of north and east."""
@@ -180,12 +182,19 @@ def _possible(columns: Mapping[str, Measured], variables: Mapping[str, str]) -> 
     found: dict[str, list[str]] = {}
     for channel, column in columns.items():
         units = [column.unit] if column.is_sure else units_by_size(channel, column.values)
-        units += [column.unit] if column.unit in RARE and column.unit not in units else []
+        if column.unit not in units and (column.unit in RARE or _counts_turns(column)):
+            units.append(column.unit)
         found[variables[channel]] = [unit for unit in found.get(variables[channel], units) if unit in units]
     loose = [column for channel, column in columns.items() if variables[channel] == "angles"]
     if circle := _circle(loose):
         found["angles"] = [circle]
     return found
+
+
+def _counts_turns(column: Measured) -> bool:
+    """Say whether a column is a heading that its name has in radians or degrees, and that counts on over some turns."""
+    turn = {"rad": 2.0 * math.pi, "degree": 360.0}.get(column.unit, 0.0) * (column.channel == "heading")
+    return bool(np.nanmax(np.abs(column.values)) <= MOST_TURNS * turn)
 
 
 def _circle(loose: Sequence[Measured]) -> str:
@@ -196,9 +205,8 @@ def _circle(loose: Sequence[Measured]) -> str:
     """
     sizes = [(np.nanmax(np.abs(angle.values)), LARGEST_ANGLES.get(angle.channel, math.pi)) for angle in loose]
     if all(size <= 1.01 * most for size, most in sizes):
-        spans = [
-            np.ptp(angle.values[np.isfinite(angle.values)]) for angle in loose if angle.channel == "heading"
-        ]
+        headings = [angle.values[np.isfinite(angle.values)] for angle in loose if angle.channel == "heading"]
+        spans = [np.ptp(heading) for heading in headings]
         return "rad" if spans and spans[0] > QUARTER_TURN else ""
     return "degree" if max(size for size, _ in sizes) <= LIMITS["degree"] else "centidegree"
 
@@ -206,12 +214,10 @@ def _circle(loose: Sequence[Measured]) -> str:
 def _slope(tie: Tie, columns: Mapping[str, Measured], time: np.ndarray) -> _Slope | None:
     """Return the slope of a tie where both sides are measured and as good as proportional."""
     lefts = (tie.left, "east") if tie.left == "north" else (tie.left,)
-    if (
-        any(name not in columns for name in (*lefts, *tie.right))
-        or len({columns[name].unit for name in lefts}) > 1
-    ):
+    names = (*lefts, *tie.right)
+    if not columns.keys() >= set(names) or len({columns[name].unit for name in lefts}) > 1:
         return None
-    series = {name: _filled(columns[name], time) for name in (*lefts, *tie.right)}
+    series = {name: _filled(columns[name], time) for name in names}
     known = np.all([np.isfinite(values) for values in series.values()], axis=0)
     if known.sum() < FEWEST_ROWS:
         return None

@@ -1,31 +1,16 @@
-"""The map: which column of a log is which channel, in which unit, and why; found, written, edited, and read again.
-
-    [time]
-    columns = ["TimeUS"]
-    unit = "us"
-
-    [columns]
-    "NAV_SPEED" = { channel = "surge_speed", unit = "kn" }
-
-Without a map it is found from names (`logs.names`) and values (`logs.evidence`). What they do not decide, or
-contradict, is asked: the map then has to say it. A map that is given is the whole map, and its word holds.
+"""Which column of a log is which channel, in which unit, and why: found from names (`logs.names`) and values
+(`logs.evidence`). What these do not decide, or contradict, is asked; the map of `logs.map_file` then has to say it.
 """
 
 from __future__ import annotations
 
-import json
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import datetime
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from subzero.channels import BY_COLUMN, BY_NAME, TIME
-from subzero.errors import UserError, listed, printable, real, short, suggestion
-from subzero.files.read_file import MOST_OF_A_TOML, UnreadableFileError, read_text
+from subzero.channels import TIME
+from subzero.errors import short
 from subzero.logs import times
 from subzero.logs.evidence import Contradiction, Findings, Measured, findings, tied, units_by_size
 from subzero.logs.names import (
@@ -35,29 +20,21 @@ from subzero.logs.names import (
     TARGETS,
     UNITS,
     Named,
-    kind_of,
+    reason_unused,
     recognised,
-    unit_of,
 )
-from subzero.logs.table import NUMBER, TEXT, Table
+from subzero.logs.table import NUMBER, TEXT, Table, names_of, refusal
 
 ASKED = "?"
 """Unit in a map that the user has to fill in."""
 RIVAL = "one of several with this channel"
 """Reason of a column that may be the one to be used."""
+ACROSS = "sway_speed", "heave_speed"
+"""Channels that one letter may mean, v and w, and that are taken only with a speed ahead."""
 ALIKE = 0.98
 """Cosine between two columns from which on they measure the same. [-]"""
 EQUATOR_M, SQUARED_ECCENTRICITY = 6378137.0, 6.69437999014e-3
 """Ellipsoid WGS 84."""
-TIME_KEYS = {
-    "columns": list,
-    "unit": str,
-    "start": (int, float, str),
-    "part": int,
-    "sort": bool,
-    "every_s": (int, float),
-}
-COLUMN_KEYS = {"channel": str, "unit": str, "factor": (int, float)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,11 +108,14 @@ def find_clock(table: Table) -> tuple[Clock, tuple[str, ...]]:
     if len(clocks) == 2 or (not named and times.TIME_OF_DAY in by_form):
         return Clock(columns=tuple(clocks), reason="date and time of day"[0 if len(clocks) == 2 else 9 :]), ()
     if not named:
-        raise UserError(
-            f"The log {table.source} cannot be imported: none of its columns is a time. Name it in the map: [time] "
-            'columns = ["NAME"], unit = "s", or say how far rows are apart: [time] every_s = 0.1.'
+        why = f"none of its columns is a time: {names_of(table.columns)}"
+        remedy = (
+            'Say in the map: [time] columns = ["NAME"], unit = "s", or how far rows are apart: every_s = 0.1.'
         )
+        raise refusal(table.source, why, remedy)
     name = min(named, key=lambda name: named[name].rank)
+    if fractions := [other for other in named if _are_fractions(table, name, other)]:
+        return Clock(columns=(name, fractions[0]), unit="s", reason="seconds and their fractions"), ()
     return _clock_of_numbers(name, table.columns[name].values, named[name].unit)
 
 
@@ -145,9 +125,21 @@ def _is_time(table: Table, name: str) -> Named | None:
     return found if found and found.channel == TIME.name and np.isfinite(column.values).any() else None
 
 
+def _are_fractions(table: Table, name: str, other: str) -> bool:
+    """Say whether the fractions of a clock in whole seconds stand in another column, as its name and numbers say."""
+    both = [
+        column.values[np.isfinite(column.values)] for column in (table.columns[name], table.columns[other])
+    ]
+    named = recognised(other)
+    is_whole = all(values.size and np.all(values == np.round(values)) for values in both)
+    return bool(is_whole and named and named.unit in ("us", "ns") and both[1].max() < 1e9 and np.ptp(both[1]) > 0.0
+                and (np.diff(both[0]) == 0.0).any())  # fmt: skip
+
+
 def _clock_of_numbers(name: str, values: np.ndarray, written: str) -> tuple[Clock, tuple[str, ...]]:
     """Return the clock of a column of numbers, in the unit that is written if its size and steps allow that."""
-    likely, is_epoch = times.unit_by_values(values), times.is_epoch(values)
+    likely = times.unit_by_values(values)
+    is_epoch = len(likely) == 1 and np.nanmedian(values) * CLOCK_UNITS[likely[0]] > min(times.EPOCHS)
     if written and (written in likely or len(likely) != 1 or written in ("min", "h", "datenum")):
         return Clock(columns=(name,), unit=written, reason="unit in the name"), ()
     if len(likely) == 1 and (not written or is_epoch):
@@ -170,36 +162,28 @@ def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> 
     named = {
         name: found
         for name, column in table.columns.items()
-        if column.form == NUMBER
-        and (found := recognised(name, column.unit))
-        and found.channel != TIME.name
+        if column.form == NUMBER and (found := recognised(name, column.unit)) and found.channel != TIME.name
         and np.isfinite(column.values[rows]).any()
-        and (
-            found.channel not in (LATITUDE, LONGITUDE) or np.nan_to_num(column.values[rows]).any()
-        )  # 0: no fix
-    }
+        and (found.channel not in (LATITUDE, LONGITUDE) or np.nan_to_num(column.values[rows]).any())  # 0: no fix
+    }  # fmt: skip
+    if "surge_speed" not in {found.channel for found in named.values()}:  # v may be the speed itself
+        named = {name: found for name, found in named.items() if found.channel not in ACROSS}
     values = {name: table.columns[name].values[rows] for name in named}
     chosen, questions = _chosen(named, values, time)
     used = {
         name: named[name] for name, why in chosen.items() if why != RIVAL and not why.startswith("not used")
     }
-    columns = {
-        found.channel: Measured(found.channel, values[name], found.unit) for name, found in used.items()
-    }
+    columns = {use.channel: Measured(use.channel, values[name], use.unit) for name, use in used.items()}
     said = findings({**_positions(columns), **columns}, time)
     lines = {name: _unused(table, name, chosen) for name in table.columns if name not in clock.columns}
-    lines |= {
-        name: Line(name=name, channel=named[name].channel, unit=named[name].unit or ASKED, reason=RIVAL)
-        for name, reason in chosen.items()
-        if reason == RIVAL
-    }
+    lines |= {name: Line(name=name, channel=named[name].channel, unit=named[name].unit or ASKED, reason=RIVAL)
+              for name, reason in chosen.items() if reason == RIVAL}  # fmt: skip
     lines |= {name: _line(name, found, said, chosen[name]) for name, found in used.items()}
     questions += [_question(lines[name], said) for name in used if lines[name].unit == ASKED]
     names = {found.channel: lines[name] for name, found in used.items()}
-    odd = [_words(tie, names) for tie in said.contradictions if tie.channels[0] in names]
-    is_asked = [tie.is_of_units for tie in said.contradictions if tie.channels[0] in names]
-    questions += [words for words, asked in zip(odd, is_asked, strict=True) if asked]
-    notes = tuple(words for words, asked in zip(odd, is_asked, strict=True) if not asked)
+    odd = [(tie.is_of_units, _words(tie, names)) for tie in said.contradictions if tie.channels[0] in names]
+    questions += [words for is_asked, words in odd if is_asked]
+    notes = tuple(words for is_asked, words in odd if not is_asked)
     return Map(clock=clock, lines=tuple(lines.values()), questions=tuple(questions), notes=notes)
 
 
@@ -215,10 +199,12 @@ def contradictions(mapping: Map, table: Table, rows: np.ndarray, time: np.ndarra
 def _unused(table: Table, name: str, chosen: Mapping[str, str]) -> Line:
     """Return the line of a column that is not used, and why."""
     column, named = table.columns[name], recognised(name)
-    reason = "not used: no channel has this name"
+    reason = f"not used: {reason_unused(name) or 'no channel has this name'}"
+    if named and named.channel in ACROSS:
+        reason = f"not used: a {named.channel}, of a log without a speed ahead; say in the map what it is"
     if column.form not in (NUMBER, TEXT) or (named and named.channel == TIME.name):
         reason = "not used: another time"
-    if column.form == TEXT or not np.isfinite(column.values).any():
+    if column.form == TEXT or (named and column.is_empty):
         reason = "not used: no numbers"
     return Line(name=name, reason=chosen.get(name, reason))
 
@@ -226,17 +212,13 @@ def _unused(table: Table, name: str, chosen: Mapping[str, str]) -> Line:
 def _line(name: str, named: Named, found: Findings, choice: str) -> Line:
     """Return the line of a column whose unit is stated, decided by values, or asked."""
     units, agrees = found.units[named.channel], found.agrees[named.channel]
-    why = (
-        [choice, named.reason if named.unit else "by its values"]
-        if choice
-        else [named.reason if named.unit else "by its values"]
-    )
+    why = [choice] if choice else []
+    why += [named.reason if named.unit else "by its values"]
     why += [f"agrees with the {' and the '.join(dict.fromkeys(agrees))}"] if agrees else []
     line = Line(name=name, channel=named.channel, unit=named.unit, reason="; ".join(why))
     if named.unit:
-        return replace(
-            line, unit=named.unit if named.unit in units or agrees else ASKED, is_open=units != [named.unit]
-        )
+        unit = named.unit if named.unit in units or agrees else ASKED
+        return replace(line, unit=unit, is_open=units != [named.unit])
     return replace(line, unit=units[0]) if len(units) == 1 else replace(line, unit=ASKED, reason="asked")
 
 
@@ -294,10 +276,8 @@ def _best_of(
         return rivals[0], ""
     others = {found.channel: Measured(found.channel, values[name]) for name, found in named.items()}
     channel = named[rivals[0]].channel
-    agreeing = [
-        name for name in rivals if tied(channel, {**others, channel: Measured(channel, values[name])}, time)
-    ]
-    best = agreeing or list(rivals)
+    measured = {name: {**others, channel: Measured(channel, values[name])} for name in rivals}
+    best = [name for name in rivals if tied(channel, measured[name], time)] or list(rivals)
     if all(_are_alike(values[best[0]], values[name]) for name in best[1:]):
         odd, same = [name for name in rivals if name not in best], ", ".join(map(short, best[1:]))
         words = [f"as good as {same}"] if same else []
@@ -309,11 +289,10 @@ def _best_of(
 def _are_alike(first: np.ndarray, second: np.ndarray) -> bool:
     """Say whether two columns change alike, by as much."""
     known = np.isfinite(first) & np.isfinite(second)
-    a, b = (
-        values[known] - values[known].mean() if known.any() else values[known] for values in (first, second)
-    )
-    size = float(a @ a + b @ b)
-    return bool(known.any()) and 2.0 * float(a @ b) >= ALIKE * size
+    if not known.any():
+        return False
+    a, b = (values[known] - values[known].mean() for values in (first, second))
+    return 2.0 * float(a @ b) >= ALIKE * float(a @ a + b @ b)
 
 
 def _positions(columns: Mapping[str, Measured]) -> dict[str, Measured]:
@@ -324,10 +303,7 @@ def _positions(columns: Mapping[str, Measured]) -> dict[str, Measured]:
     if len(places) < 2 or not all(units):
         return {}
     metres = north_and_east([place.values for place in places], units)
-    return {
-        name: Measured(name, values, "m", True)
-        for name, values in zip(("north", "east"), metres, strict=True)
-    }
+    return {name: Measured(name, way, "m", True) for name, way in zip(("north", "east"), metres, strict=True)}
 
 
 def north_and_east(places: Sequence[np.ndarray], units: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
@@ -351,148 +327,3 @@ def _radians(angle: np.ndarray, unit: str) -> np.ndarray:
         angle = whole + (angle - 100.0 * whole) / 60.0
     radians: np.ndarray = np.radians(angle * UNITS[LATITUDE][unit].factor)
     return radians
-
-
-# Written and read
-
-
-def to_toml(mapping: Map, source: str) -> str:
-    """Return a map as TOML, with every reason and question, ready to be edited."""
-    clock = mapping.clock
-    asked = [f"# To decide: {printable(question)}" for question in mapping.questions]
-    entries = {key: getattr(clock, key) for key in TIME_KEYS}
-    said = [
-        f"{key} = {_text(value)}"
-        for key, value in entries.items()
-        if value or (key == "start" and value == 0)
-    ]
-    lines = [_entry(line) for line in mapping.lines]
-    head = f"# How {source} is read: edit it, and give it again with subzero import ... --map."
-    return "\n".join([head, *asked, "", f"[time]  # {clock.reason}", *said, "", "[columns]", *lines]) + "\n"
-
-
-def _entry(line: Line) -> str:
-    name, reason = _text(line.name), printable(line.reason)
-    if not line.channel:
-        return f"# {name}  {reason}"
-    factor = f", factor = {line.factor:g}" if line.factor != 1.0 else ""
-    return f"{name} = {{ channel = {_text(line.channel)}, unit = {_text(line.unit)}{factor} }}  # {reason}"
-
-
-def _text(value: object) -> str:
-    """Return a value as TOML writes it, which for texts, numbers and lists of texts is as JSON does."""
-    return json.dumps(list(value) if isinstance(value, tuple) else value, ensure_ascii=True)
-
-
-def read_map(path: str | Path, table: Table) -> Map:
-    """Read a map, and hold it against the log that it is for.
-
-    Raises:
-        UserError: it cannot be read, or does not suit; names every problem.
-    """
-    try:
-        content = tomllib.loads(read_text(path, MOST_OF_A_TOML))
-        problems = _keys("the map", content, {"time": dict, "columns": dict})
-    except (UnreadableFileError, ValueError, RecursionError) as error:
-        content, problems = {}, [str(error)]
-    if not problems:
-        clock = _read_clock(content.get("time", {}), table, problems)
-        columns = content.get("columns", {})
-        lines = [
-            line for name, entry in columns.items() if (line := _read_line(name, entry, table, problems))
-        ]
-        targets = [TARGETS.get(line.channel, line.channel) for line in lines]
-        problems += [
-            f"{target} is more than one column; keep one"
-            for target in dict.fromkeys(targets)
-            if targets.count(target) > 1
-        ]
-        problems += [] if columns else ["it names no columns; write them below [columns]"]
-    if problems:
-        raise UserError(listed(f"The map {printable(str(path))} cannot be used:", problems))
-    rest = [name for name in table.columns if name not in {*columns, *clock.columns}]
-    return Map(
-        clock=clock, lines=(*lines, *(Line(name=name, reason="not used: not in the map") for name in rest))
-    )
-
-
-def _keys(where: str, entry: object, allowed: Mapping[str, Any]) -> list[str]:
-    """Return the keys of a table that are not allowed, or hold a value of another kind."""
-    if not isinstance(entry, dict):
-        return [f"{where} must be a table with {', '.join(allowed)}"]
-    unknown = [key for key in entry if key not in allowed]
-    wrong = [key for key, value in entry.items() if key in allowed and not _is(value, allowed[key])]
-    problems = [
-        f"{where} has no {short(key)}.{suggestion(key, allowed)} Allowed: {', '.join(allowed)}"
-        for key in unknown
-    ]
-    return problems + [f"{where}: {key} is {short(entry[key])}, which is no value for it" for key in wrong]
-
-
-def _is(value: object, kinds: Any) -> bool:
-    """Say whether a value is of some kinds: a finite number, a truth value only where that is asked for."""
-    if isinstance(value, bool) or kinds is bool:
-        return isinstance(value, bool) and kinds is bool
-    return isinstance(value, kinds) and (isinstance(value, str | list | dict) or real(value) is not None)
-
-
-def _read_clock(entry: dict[str, Any], table: Table, problems: list[str]) -> Clock:
-    """Read how times are read; problems are added to a list."""
-    names, start = entry.get("columns", []), entry.get("start")
-    entry = entry | (
-        {"start": str(start)} if isinstance(start, datetime) else {}
-    )  # TOML has dates of its own
-    wrong = _keys("[time]", entry, TIME_KEYS)
-    if not wrong and not all(isinstance(name, str) for name in names):
-        wrong = [f"[time]: columns is {short(names)}, which is no value for it"]
-    if wrong:
-        problems += wrong
-        return Clock()
-    clock = Clock(**{**entry, "columns": tuple(names)})
-    problems += [_missing(name, table) for name in clock.columns if name not in table.columns]
-    is_number = [table.columns[name].form == NUMBER for name in clock.columns if name in table.columns]
-    if (clock.unit or any(is_number)) and clock.unit not in CLOCK_UNITS:
-        problems.append(f"[time]: unit is {short(clock.unit)}; it must be one of {', '.join(CLOCK_UNITS)}")
-    if bool(clock.columns) == bool(clock.every_s) or clock.every_s < 0.0 or len(clock.columns) > 2:
-        problems.append("[time] needs columns, one or two, or else every_s, a number of seconds above 0")
-    if clock.start is not None and times.start_of(clock.start) is None:
-        problems.append(f"[time]: start is {short(clock.start)}; it must be a time as the log writes it")
-    return clock
-
-
-def _read_line(name: str, entry: Any, table: Table, problems: list[str]) -> Line | None:
-    """Read the line of one column; problems are added to a list."""
-    wrong = _keys(short(name), entry, COLUMN_KEYS)
-    if not wrong and not {"channel", "unit"} <= set(entry):
-        wrong = [f"{short(name)} needs channel and unit"]
-    if name not in table.columns:
-        wrong.append(_missing(name, table))
-    elif not np.isfinite(table.columns[name].values).any() or table.columns[name].form != NUMBER:
-        wrong.append(f"{short(name)} holds no numbers in this log; leave it out")
-    allowed = [channel for channel in (*BY_NAME, *TARGETS) if channel != TIME.name]
-    channel = (
-        ""
-        if wrong
-        else BY_COLUMN[entry["channel"]].name
-        if entry["channel"] in BY_COLUMN
-        else entry["channel"]
-    )
-    if not wrong and channel not in allowed:
-        wrong = [f"{short(name)}: there is no channel {short(channel)}.{suggestion(channel, allowed)}"]
-    unit = "" if wrong else unit_of(kind_of(channel), entry["unit"])
-    if not wrong and (not unit or entry.get("factor") == 0):
-        known = ", ".join(UNITS[kind_of(channel)])
-        wrong = [
-            f"{short(name)}: {channel} is in one of {known}, not in {short(entry['unit'])}, times a factor other than 0"
-        ]
-    problems += wrong
-    return (
-        None
-        if wrong
-        else Line(name=name, channel=channel, unit=unit, factor=entry.get("factor", 1.0), reason="map")
-    )
-
-
-def _missing(name: object, table: Table) -> str:
-    have = ", ".join(map(short, table.columns))
-    return f"the log has no column {short(name)}.{suggestion(name, table.columns)} It has {have}"

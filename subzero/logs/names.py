@@ -2,7 +2,7 @@
 
 A name is cut into words, ``NAV_HEADING`` → nav heading, ``depth[cm]`` → depth in cm, ``yaw_rad`` → yaw in rad. Words of
 a message or a sensor before it, and numbers of instances, do not count. Only whole names of the table are recognised:
-``DesYaw`` is no heading.
+``DesYaw`` is no heading. Of ``heading @ /odom`` in a log of ROS, the topic only says whether it is a command.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from subzero.channels import BY_NAME
 LATITUDE, LONGITUDE, PRESSURE = "latitude", "longitude", "pressure"
 TARGETS = {LATITUDE: "north", LONGITUDE: "east", PRESSURE: "depth"}
 """What is no channel itself → the channel that it becomes."""
-RARE = ("mm", "km", "mm/s", "mrad", "mrad/s", "psi")
+RARE = ("mm", "km", "mm/s", "mrad", "mrad/s", "psi", "dbar absolute", "bar absolute", "psi absolute")
 """Units that are only believed where a name says so."""
 BRACKET = r"[\[(]([^\])]*)[\])]?"
 """A unit in a name, or the number of an instance."""
@@ -55,6 +55,11 @@ def unit_of(kind: str, text: str) -> str:
     return SPELLINGS.get((kind, _spelling(text)), "")
 
 
+def reason_unused(name: str) -> str:
+    """Return why a column that loggers are known for is no channel; empty if it may be one."""
+    return next((reason for reason, pattern in UNUSED.items() if pattern.search(name)), "")
+
+
 def recognised(name: str, unit: str = "") -> Named | None:
     """Return what the name of a column, and the unit that the file has for it, say; None if no channel and no time.
 
@@ -62,11 +67,14 @@ def recognised(name: str, unit: str = "") -> Named | None:
         name: as the logger wrote it.
         unit: of a row of units, or an attribute; empty if there is none.
     """
-    plain = re.sub(BRACKET, " ", name)
+    field, _, topic = name.partition(" @ ")
+    plain = re.sub(BRACKET, " ", field)
     words = _words(plain)
+    if reason_unused(name) or not COMMANDS.isdisjoint(_words(topic)):
+        return None
     if re.search(r"(^|[^A-Za-z])[A-Za-z]\d+$", plain.strip()):  # T1 is no time, and Q1 no pitch rate
         return None
-    inside = next((text for text in re.findall(BRACKET, name) if not text.isdigit()), "")
+    inside = next((text for text in re.findall(BRACKET, field) if not text.isdigit()), "")
     for end in range(len(words), max(len(words) - 3, 0), -1):  # the last words may be a unit
         if (known := _looked_up(words[:end])) is None:
             continue
@@ -75,6 +83,8 @@ def recognised(name: str, unit: str = "") -> Named | None:
         if end < len(words) and not ending:
             continue
         by_file, by_name = unit_of(kind_of(channel), unit), unit_of(kind_of(channel), inside) or ending
+        if by_file and usual.endswith(" up"):  # an altitude is a height whatever its unit
+            by_file = unit_of(kind_of(channel), f"{by_file} up") or by_file
         reason = ["name", "name of its logger", "unit in the name", "unit in the file"]
         level = 3 if by_file else 2 if by_name else 1 if usual else 0
         return Named(channel, by_file or by_name or usual, reason[level], rank)
@@ -126,7 +136,8 @@ SPELLINGS: dict[tuple[str, str], str] = {
 }
 """(Display unit, spelling) → unit."""
 NAMES = _names(_TABLES["names"])
-PREFIXES = frozenset(_TABLES["prefixes"]["words"].split())
+PREFIXES, COMMANDS = (frozenset(_TABLES[kind]["words"].split()) for kind in ("prefixes", "commands"))
+UNUSED = {reason: re.compile(pattern) for reason, pattern in _TABLES["unused"].items()}
 LIMITS: dict[str, float] = _TABLES["limits"]
 CLOCK_UNITS = {name: unit.factor for name, unit in UNITS["s"].items()}
 """Unit of a clock → seconds; MATLAB's datenum counts days."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import tomllib
 
 import pytest
@@ -155,3 +156,29 @@ def test_as_json_it_says_the_same(here, capsys):
 def test_a_record_that_is_refused_says_that_import_reads_it(here, capsys):
     assert main(["compare", "fig6", "--measured", "log.csv"]) == MISTAKE
     assert "`subzero import` reads it" in capsys.readouterr().err
+
+
+def wandering(start, step, names):
+    rows = []
+    for k in range(round(60.0 / step)):
+        t = start + k * step
+        values = {
+            "depth_m": 5.0 + math.sin(0.3 * t) + 0.6 * math.sin(0.757 * t),
+            "pitch_deg": math.sin(0.2 * t),
+        }
+        rows.append(",".join([f"{k * step:.2f}", *(f"{values[name]:.5f}" for name in names)]))
+    return "\n".join([",".join(["time_s", *names]), *rows]) + "\n"
+
+
+def test_two_logs_of_one_trial_are_merged_on_one_clock_or_nothing_is_written(here, capsys):
+    (here / "a.csv").write_text(wandering(0.0, 0.1, ["depth_m"]))
+    (here / "b.csv").write_text(wandering(4.0, 0.2, ["depth_m", "pitch_deg"]))
+    assert main(["import", "a.csv", "b.csv", "--merge", "--out", "both.csv"]) == FINE
+    assert "b.csv: its clock is +4 ± " in capsys.readouterr().out
+    record = read_record("both.csv")
+    known = record.values["pitch"] == record.values["pitch"]
+    assert_allclose(record.values["pitch"][known], [math.sin(0.2 * t) for t in record.time[known]], atol=2e-3)
+    assert names(here) == ["a.csv", "b.csv", "b.map.toml", "both.csv", "both.map.toml", "log.csv", "open.csv"]
+    assert main(["import", "a.csv", "log.csv", "--merge", "--out", "c.csv"]) == MISTAKE
+    assert "cannot be aligned: they share no channel" in capsys.readouterr().err
+    assert not (here / "c.csv").exists()

@@ -10,8 +10,7 @@ import threading
 
 import pytest
 
-from subzero.cli import interrupts
-from subzero.cli.app import FINE, INTERRUPTED, MISTAKE, STOPPED, main
+from subzero.cli.app import FINE, INTERRUPTED, MISTAKE, STOPPED, interrupts, main
 from subzero.files.read_file import INCOMPLETE
 
 

@@ -78,6 +78,29 @@ def converted(factors, names):
     return text([[f"{value:.9g}" for value in row] for row in table], names)
 
 
+def clock(k, form="%Y-%m-%d %H:%M:%S.%f", start=(2026, 10, 25, 10, 0, 50)):
+    return (datetime.datetime(*start) + datetime.timedelta(seconds=STEP * k)).strftime(form)
+
+
+def spiked(rows, ahead):
+    return with_time(lambda k: f"{STEP * k + (ahead if k in rows else 0.0):.6g}")
+
+
+def held(columns):
+    """The record with some columns logged once a second, and straight lines in between."""
+    values = np.array(truth())
+    known = np.arange(0, ROWS, 10)
+    for at in columns:
+        values[at] = np.interp(np.arange(ROWS), known, values[at][known])
+    return text([[f"{value:.6g}" for value in row] for row in values.T])
+
+
+def in_two(first, second, make):
+    """The record with its time in two columns."""
+    return text([[*make(k), *row[1:]] for k, row in enumerate(cells())], [first, second, *COLUMNS[1:]])
+
+
+ARABIC = str.maketrans("0123456789", "٠١٢٣٤٥٦٧٨٩")
 RAD = np.pi / 180.0
 GERMAN = ["Zeit [s]", "Fahrt [m/s]", "Kurs [°]", "Drehrate [°/s]", "Pitch [°]", "Roll [°]", "Tiefe [m]"]
 READ = {
@@ -102,6 +125,8 @@ READ = {
     "words": text([[*row, "manual"] for row in cells()], [*COLUMNS, "mode"]),
     "nanoseconds": with_time(lambda k: str(EPOCH * 10**9 + k * 10**8)),
     "milliseconds": with_time(lambda k: str(EPOCH * 1000 + k * 100), ["timestamp", *COLUMNS[1:]]),
+    "nanoseconds since a start": with_time(lambda k: str(5 * 10**12 + k * 10**8), ["timestamp_ns", *COLUMNS[1:]]),
+    "microseconds since a start": with_time(lambda k: str(5 * 10**9 + k * 10**5), ["time", *COLUMNS[1:]]),
     "seconds since 1970": with_time(lambda k: f"{EPOCH + STEP * k:.3f}", ["time", *COLUMNS[1:]]),
     "TimeUS": with_time(lambda k: str(12_345_678 + k * 100_000), ["TimeUS", *COLUMNS[1:]]),
     "six digits of an uptime": with_time(lambda k: f"{90274.5 + STEP * k:.6G}"),
@@ -117,6 +142,19 @@ READ = {
         [1.0, 3600.0 / 1852.0, RAD, RAD, RAD, RAD, 1.0 / 0.3048],
         ["t", "Speed (kn)", "yaw_rad", "YawRate [rad/s]", "pitch_rad", "Roll(rad)", "depth[ft]"]),
     "MOOS": converted([1.0] * 7, ["TIME", "NAV_SPEED", "NAV_HEADING", *COLUMNS[3:6], "NAV_DEPTH"]),
+    "digits of Arabic": text([[cell.translate(ARABIC) for cell in row] for row in cells()]),
+    "delimiters behind rows": ",".join(COLUMNS) + "\n" + "".join(",".join(row) + ",\n" for row in cells()),
+    "two rows of names": "a,a,a,b,b,b,b\n" + text([["s", "m/s", "deg", "deg/s", "deg", "deg", "m"], *cells()]),
+    "day first": with_time(lambda k: clock(k, "%d/%m/%Y %H:%M:%S.%f")),
+    "month first": with_time(lambda k: clock(k, "%m/%d/%Y %I:%M:%S.%f %p")),
+    "month first, over the tenth": with_time(lambda k: clock(k, "%m/%d/%Y %H:%M:%S.%f", (2026, 10, 12, 23, 59, 50))),
+    "a day that can be a month": with_time(lambda k: clock(k, "%d/%m/%Y %H:%M:%S.%f", (2026, 4, 3, 10, 0, 50))),
+    "month in letters": with_time(lambda k: clock(k, "%d-%b-%Y %H:%M:%S.%f")),
+    "iso without signs": with_time(lambda k: clock(k, "%Y%m%dT%H%M%S.%fZ")),
+    "hhmmss": with_time(lambda k: clock(k, "%H%M%S.%f"), ["utc", *COLUMNS[1:]]),
+    "days of Excel": with_time(lambda k: f"{46320.4 + STEP * k / 86400.0:.12f}", ["time", *COLUMNS[1:]]),
+    "seconds and nanoseconds": in_two("sec", "nanosec", lambda k: (str(EPOCH + k // 10), str(k % 10 * 10**8))),
+    "seconds and microseconds": in_two("tv_sec", "tv_usec", lambda k: (str(k // 10), str(k % 10 * 10**5))),
     "angles decided by values": converted(
         [1.0, 1.0, RAD, RAD, RAD, RAD, 100.0],
         ["time", "speed_m_s", "yaw", "yawrate_rad_s", "pitch", "roll", "depth_cm"]),
@@ -131,6 +169,17 @@ NAMED = {
         with_time(lambda k: str(12_345_678 + k * 100_000)), "'time_s' (time): by its name in s, by its steps in us",
     ),
     "centidegrees": (converted([1, 1, 100, 1, 1, 1, 1], COLUMNS), "centidegree would do"),
+    "stamps ahead": (spiked((40, 97, 200), 0.15), "3 rows are not later than the row before, the first is row 42"),
+    "spikes of the clock": (spiked(range(20, 301, 60), 4.0), "5 rows are not later than the row before"),
+    "backwards": (with_time(lambda k: f"{30.0 - STEP * k:.6g}"), "its clock runs backwards. Say so in the map"),
+    "days or months first": (with_time(lambda k: clock(k, "%d/%m/%Y %H:%M:%S.%f", (2026, 4, 3, 23, 59, 50))),
+                             "'time_s' has dates of which nothing says whether the day or the month is first"),
+    "both orders": (with_time(lambda k: clock(k, ("%d/%m/%Y", "%m/%d/%Y")[k % 2] + " %H:%M:%S.%f")),
+                    "has dates with the day first and with the month first"),
+    "fractions that repeat the seconds": (in_two("sec", "nanosec", lambda k: (str(k // 10), str(k // 10))),
+                                          "rows have the time of the row before"),
+    "a list": (text([[f"{0.1 * (k // 3):.1f}", "depth_m", "2"] for k in range(90)], ["time", "name", "value"]),
+               "rows have the time of the row before"),
     "mixed zones": (with_time(lambda k: iso(k, zone=k % 2 == 0)), "some of its times have a zone and some have none"),
     "no unit": (converted([1.0] * 7, ["time", "speed", *COLUMNS[2:]]), "'speed' (surge_speed): in "),
     "no time": (text([row[1:] for row in cells()], COLUMNS[1:]), "none of its columns is a time"),
@@ -171,17 +220,26 @@ def test_a_form_that_cannot_be_read_is_named_in_one_message(form, tmp_path):
     assert words in str(error.value)
 
 
-@pytest.mark.parametrize("word", ["NaN", "nan", "NULL", "#N/A", "-", "inf", '""', "-9999", "9999", ""])
+@pytest.mark.parametrize(
+    "word", ["NaN", "nan", "NULL", "#N/A", "-", "inf", '""', "-9999", "9999", "-999", "-32768", "65535", ""]
+)
 def test_words_and_numbers_for_nothing_are_gaps(word, tmp_path):
     record = subzero.read_log(make(tmp_path / "log.csv", with_gaps(word)))
     assert list(np.flatnonzero(np.isnan(record.values["depth"]))) == [5, 6, 50, 51, 52]
-    assert ("9999" in word) == any("taken as gaps" in note for note in record.notes)
+    assert word.lstrip("-").isdigit() == any("taken as gaps" in note for note in record.notes)
 
 
 def test_a_counter_that_passes_9999_has_no_gap_there(tmp_path):
     lines = "".join(f"{k},{9990 + k}\n" for k in range(30))
     record = subzero.read_log(make(tmp_path / "log.csv", "time_s,cable_length_m\n" + lines))
     assert np.isfinite(record.values["cable_length"]).all()
+
+
+def test_two_numbers_for_nothing_in_one_column_are_both_gaps(tmp_path):
+    rows = cells()
+    rows[5][6], rows[9][6] = "-999", "99999"
+    record = subzero.read_log(make(tmp_path / "log.csv", text(rows)))
+    assert list(np.flatnonzero(np.isnan(record.values["depth"]))) == [5, 9]
 
 
 def test_a_last_row_that_was_cut_off_is_left_out_and_said(tmp_path):
@@ -202,20 +260,96 @@ def test_latitude_and_longitude_become_metres(tmp_path):
         assert_allclose(record.values["east"], east, rtol=1e-4, atol=0.02)
 
 
+@pytest.mark.parametrize("lines", ["{t},{lat},S,{lon},W\n", "{t},{lat}S,{lon}W\n"])
+def test_letters_are_the_signs_of_latitude_and_longitude(lines, tmp_path):
+    names = "time_s,lat,ns,lon,ew\n" if ",S" in lines else "time_s,lat,lon\n"
+    rows = [lines.format(t=k, lat=33.5 + 1e-5 * k, lon=70.25 + 1e-5 * k) for k in range(40)]
+    record = subzero.read_log(make(tmp_path / "log.csv", names + "".join(rows)))
+    assert record.values["north"][-1] < -40.0  # farther south
+    assert record.values["east"][-1] < -30.0  # farther west
+
+
+def test_what_was_interpolated_or_has_no_speed_is_read_all_the_same(tmp_path):
+    record = subzero.read_log(make(tmp_path / "log.csv", held([2])))
+    known = np.isfinite(record.values["heading"])
+    assert_allclose(record.values["heading"][known], truth()[2][known], atol=1e-3)
+    rows = "".join(f"{t:.1f},{3 * t:.3f},{-2 * t:.3f}\n" for t in truth()[0])
+    record = subzero.read_log(make(tmp_path / "log.csv", "time_s,north_m,east_m\n" + rows))
+    assert_allclose(record.values["north"], 3.0 * truth()[0], atol=1e-3)
+
+
+def test_a_heading_that_counts_on_over_three_turns_is_in_the_unit_of_its_name(tmp_path):
+    heading = np.linspace(2.0, 22.0, 60)
+    rows = "".join(f"{0.5 * k},{value:.6f}\n" for k, value in enumerate(heading))
+    record = subzero.read_log(make(tmp_path / "log.csv", "Time (s),Yaw (rad)\n" + rows))
+    assert_allclose(record.values["heading"], np.degrees(heading), atol=1e-3)
+
+
+def test_a_log_with_more_rows_than_a_record_can_have_keeps_every_nth(tmp_path, monkeypatch):
+    from subzero.logs import text as module
+
+    monkeypatch.setattr(module, "MOST_ROWS", 50)
+    monkeypatch.setattr(module, "CHUNK", 7)
+    content = text([[*row, "word"] for row in cells()], [*COLUMNS, "mode"])
+    record = subzero.read_log(make(tmp_path / "log.csv", content))
+    stride = round(ROWS / record.time.size)
+    assert 6 <= stride <= 8
+    hold(record, rows=slice(None, None, stride))
+    assert f"Of {stride} rows one is kept, {record.time.size} in all." in record.notes
+    turns = [[f"{0.1 * k:.1f}", "1" if k % 2 else "", "" if k % 2 else "2"] for k in range(300)]
+    with pytest.raises(UserError, match="which hold sensors in turn"):
+        subzero.read_log(make(tmp_path / "log.csv", text(turns, ["time_s", "depth_m", "surge_speed_m_s"])))
+
+
 def test_of_two_pressure_sensors_the_one_that_dives_is_taken_and_it_is_said(tmp_path):
     """As in ArduSub's logs, number 0 is inside the hull and shows its own warming up."""
     rng, (t, speed, _, _, pitch, _, depth) = np.random.default_rng(1), truth()
     inside = 99_790.0 + 40.0 * t / 30.0 + rng.normal(0.0, 8.0, t.size)
     outside = 101_325.0 + 1025.0 * 9.81 * depth + rng.normal(0.0, 30.0, t.size)
     rows = [",".join(f"{x:.9g}" for x in row) for row in zip(t, speed, pitch, inside, outside, strict=True)]
-    head = "time_s,surge_speed_m_s,pitch_deg,BARO[0].Press,BARO[1].Press"
+    head = "time_s,surge_speed_m_s,pitch_deg,press[0],press[1]"
     path = make(tmp_path / "log.csv", "\n".join([head, *rows]) + "\n")
     assert_allclose(subzero.read_log(path).values["depth"], depth, atol=0.02)
     from subzero.logs.api import import_log
 
     reasons = {row[0]: row[4] for row in import_log(path).table()}
-    assert "which 'BARO[0].Press' does not" in reasons["BARO[1].Press"]
-    assert reasons["BARO[0].Press"] == "not used: 'BARO[1].Press' is the depth"
+    assert "which 'press[0]' does not" in reasons["press[1]"]
+    assert reasons["press[0]"] == "not used: 'press[1]' is the depth"
+
+
+def test_rows_before_the_clock_was_set_are_left_out_and_said(tmp_path):
+    """Slocum writes a row of sizes in byte below its units; a clock without a fix begins at 0."""
+    lines = [f"{EPOCH + STEP * k:.1f} {0.02 * k:.3f} {2.0 + 0.01 * k:.3f}" for k in range(60)]
+    head = ["m_present_time m_heading m_depth", "timestamp rad m", "8 4 4", "9.5 0 0"]
+    record = subzero.read_log(make(tmp_path / "log.csv", "\n".join([*head, *lines]) + "\n"))
+    assert_allclose(record.time, STEP * np.arange(60), atol=1e-5)
+    assert_allclose(record.values["depth"], 2.0 + 0.01 * np.arange(60))
+    assert "2 rows before the clock was set are left out." in record.notes
+
+
+def test_a_velocity_of_one_letter_alone_may_be_the_speed_and_is_not_used(tmp_path):
+    from subzero.logs.api import import_log
+
+    lines = "".join(f"{k},{1 + 0.1 * k},{3 - 0.05 * k:g}\n" for k in range(30))
+    table = {
+        row[0]: row for row in import_log(make(tmp_path / "log.csv", "t,depth_m,v[m/s]\n" + lines)).table()
+    }
+    assert table["v[m/s]"][1] == ""
+    assert "without a speed ahead; say in the map what it is" in table["v[m/s]"][4]
+    table = {
+        row[0]: row for row in import_log(make(tmp_path / "log.csv", "t,u_m_s,v[m/s]\n" + lines)).table()
+    }
+    assert table["v[m/s]"][1] == "sway_speed"
+
+
+def test_a_pressure_that_may_be_absolute_is_said(tmp_path):
+    for air, is_said in ((1.013, True), (0.0, False)):
+        rows = "".join(f"{k},{air + 0.01 * k:.4f}\n" for k in range(40))
+        record = subzero.read_log(make(tmp_path / "log.csv", "time_s,Pressure (bar)\n" + rows))
+        assert any("bar absolute" in note for note in record.notes) == is_said
+    rows = "".join(f"{k},{1.01325 + 0.1 * k:.5f}\n" for k in range(40))
+    record = subzero.read_log(make(tmp_path / "log.csv", "time_s,Pressure (bara)\n" + rows))
+    assert_allclose(record.values["depth"], 9.945049 * 0.1 * np.arange(40), atol=1e-3)
 
 
 def test_two_sensors_that_differ_are_asked_about(tmp_path):
@@ -318,7 +452,9 @@ def test_a_log_of_ardupilot_is_read_without_the_barometer_in_the_hull():
     found = import_log(SHARED / "ardusub_logs" / "small.BIN")
     lines = {line.name: line for line in found.mapping.lines}
     assert lines["CTUN.BAlt"].channel == "depth"
-    assert lines["BARO[0].Alt"].channel == ""
+    assert "BARO[0].Alt" not in lines
+    assert any("BARO[0].Alt" in note and "inside the hull" in note for note in found.record.notes)
+    assert any("to RCOU.C14 (" in note and "the pulse of a motor" in note for note in found.record.notes)
     assert lines["ATT.Yaw"].unit == "degree"
 
 
@@ -330,5 +466,5 @@ def test_what_is_no_log_of_ardupilot_is_named(tmp_path):
 
 def test_without_pymavlink_a_log_of_ardupilot_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pymavlink.DFReader", None)
-    with pytest.raises(UserError, match=r"pymavlink is not installed. pip install 'subzero-auv\[logs\]'"):
+    with pytest.raises(UserError, match=r"needs pymavlink: pip install 'subzero-auv\[logs\]'"):
         subzero.read_log(make(tmp_path / "log.bin", b"x"))
