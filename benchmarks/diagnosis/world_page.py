@@ -2,9 +2,9 @@
 
     python -m benchmarks.diagnosis.world_page
 
-writes it from what is kept of `benchmarks.diagnosis.world`, `data_errors`, `jitter` and `calibration`, and of the cases
-of `benchmarks.diagnosis` outside the catalogue, each of the seed below, which no choice was made with. Figures whose
-records are few have wide intervals; the page shows them.
+writes it from what is kept of `benchmarks.diagnosis.world`, `data_errors`, `outside`, `onsets`, `jitter` and
+`calibration`, each of the seed below, which no choice was made with. Figures whose records are few have wide intervals;
+the page shows them.
 """
 
 from __future__ import annotations
@@ -15,18 +15,21 @@ from typing import Any
 
 import numpy as np
 
-from . import calibration, data_errors, jitter, scores, world
-from .pictures import FIGURES
+from . import calibration, data_errors, jitter, onsets, outside, scores, world
 from .results import read
-from .scores import Score, share
-from .sections import mark, table
+from .scores import Score, share, table
 
 Rows = Sequence[Mapping[str, Any]]
-SEEDS = {"world": 12001, "data_errors": 12101, "outside": 91, "jitter": 10505, "calibration": 31337}
+SEEDS = {
+    "world": 12001,
+    "data_errors": 12101,
+    "outside": 91,
+    "onsets": 3,
+    "jitter": 10505,
+    "calibration": 31337,
+}
 """Of what the page rests on."""
-OF_CASES = {"outside": " --kinds outside --no-page"}
-"""Results that are those of cases on two manoeuvres."""
-PAGE = FIGURES.parent / "diagnosis_world.md"
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "diagnosis_world.md"
 KEPT = Path(__file__).parent / "kept"
 FAMILY_COLUMNS = (
     "noise",
@@ -86,7 +89,7 @@ def path_of(name: str) -> Path:
 def _commands(found: Mapping[str, Rows]) -> str:
     """Return what made the results, and how many there are."""
     return "\n".join(
-        f"    python -m benchmarks.diagnosis{OF_CASES.get(name, f'.{name}')} --seed {SEEDS[name]} --count {len(rows)}"
+        f"    python -m benchmarks.diagnosis.{name} --seed {SEEDS[name]} --count {len(rows)}"
         for name, rows in found.items()
         if rows
     )
@@ -99,11 +102,12 @@ def _scores(found: Mapping[str, Rows]) -> str:
         *of_time(found["world"]),
         *of_data_errors(found["data_errors"]),
         *of_outside(found["outside"]),
+        *of_onsets(found["onsets"]),
         *of_jitter(found["jitter"]),
         *of_calibration(found["calibration"]),
     ]
     body = [
-        [one.words, one.value, one.interval, str(one.cases), one.target, mark(one)]
+        [one.words, one.value, one.interval, str(one.cases), one.target, one.mark]
         for one in rows
         if one.cases
     ]
@@ -121,7 +125,7 @@ def of_world(results: Rows) -> list[Score]:
     clear = [one for one in results if is_clear(one)]
     stated = np.array([one["p"] for one in results])
     right = np.array([float(world.is_right(one)) for one in results])
-    error = scores.calibration_error(stated, right)[1] if results else 0.0
+    error = scores.calibration_error(stated, right) if results else 0.0
     chance = scores.by_chance(stated) if results else np.zeros(1)
     low, middle, high = np.percentile(chance, [2.5, 50.0, 97.5])
     return [
@@ -164,16 +168,27 @@ def _is_named(one: Mapping[str, Any]) -> bool:
 
 def of_outside(results: Rows) -> list[Score]:
     """Return the figures of forces and drifts outside the catalogue; weed that gathers is one that fouls the hull."""
-    clear = [one for one in results if scores.smallest_D(one) >= scores.CLEAR]
+    clear = list(filter(outside.is_clear, results))
     flagged = [one for one in clear if one["outside"]["found"]]
     return [
-        share("outside the catalogue, D ≥ 16: told so", clear, scores.is_right, "≥ 95 %", least=0.95),
-        share("… with the right axis or channel", flagged, _has_right_axis, "≥ 90 %", least=0.90),
+        share("outside the catalogue, D ≥ 16: told so", clear, outside.is_right, "≥ 95 %", least=0.95),
+        share("… with the right axis or channel", flagged, outside.has_right_axis, "≥ 90 %", least=0.90),
     ]
 
 
-def _has_right_axis(one: Mapping[str, Any]) -> bool:
-    return bool(one["outside"]["axis"] == one["outside"]["found"])
+def of_onsets(results: Rows) -> list[Score]:
+    """Return the figures of causes that only begin in mid-trial: jams, and slow changes."""
+    clear = [one for one in results if one["D"] >= onsets.CLEAR]
+    return [
+        share(
+            "jam or slow change from mid-trial on, D ≥ 16: right first",
+            clear,
+            onsets.is_right,
+            "≥ 95 %",
+            least=0.95,
+        ),
+        share("… wrong with p ≥ 0.95", results, onsets.is_confidently_wrong, "–"),
+    ]
 
 
 def of_jitter(results: Rows) -> list[Score]:
