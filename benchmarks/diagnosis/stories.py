@@ -1,4 +1,4 @@
-"""Make the seven stories of docs/diagnosis.md: hide, diagnose, and write what was found between the marks.
+"""Make the seven examples of docs/diagnosis_examples.md: hide, diagnose, and write what was found between the marks.
 
     python -m benchmarks.diagnosis.stories                      # all of them
     python -m benchmarks.diagnosis.stories rudder_lag_on_fig6   # or some
@@ -34,7 +34,7 @@ from subzero.output import open_output_folder
 from subzero.synthetic.challenge import SAMPLE_S
 from subzero.synthetic.planted import Hidden, draw_deviations, hide, make_record
 
-PAGE = Path(__file__).parents[2] / "docs" / "diagnosis.md"
+PAGE = Path(__file__).parents[2] / "docs" / "diagnosis_examples.md"
 FIGURES = PAGE.parent / "figures"
 OPEN, CLOSE = "<!-- stories -->", "<!-- end of stories -->"
 
@@ -103,7 +103,7 @@ def keep(logged: Logged, verdict: Verdict, folder: Path) -> None:
 
 def main() -> None:
     """Run the stories that are named, or all of them."""
-    parser = argparse.ArgumentParser(description="the seven stories of docs/diagnosis.md")
+    parser = argparse.ArgumentParser(description="the seven examples of docs/diagnosis_examples.md")
     parser.add_argument("names", nargs="*", choices=[[], *(story.name for story in STORIES)], help="stories")
     parser.add_argument("--keep", type=Path, help="folder for records and reports")
     asked = parser.parse_args()
