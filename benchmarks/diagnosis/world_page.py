@@ -44,10 +44,10 @@ HEAD = """# How often verdicts are right
 
 Measured on records that were not made for the diagnosis: any shipped manoeuvre or random commands, nine families of
 noise, healthy or with one hidden cause of any size; errors in the data; forces outside the catalogue; copies that
-differ by a hundredth of the noise. Truths come from the other formulation of the cable, with every number drawn from its tolerance. No
-choice in the program was made with these seeds before they were judged. Every record counts as it was first judged: two
-of them, 122 and 554, led to changes afterwards, and some results are of slightly earlier states of the program. The
-page is written by
+differ by a hundredth of the noise. Truths come from the other formulation of the cable, with every number drawn from
+its tolerance. No choice in the program was made with these seeds before they were judged. Every record counts as it was
+first judged: two of them, 122 and 554, led to changes afterwards, and some results are of slightly earlier states of
+the program. The page is written by
 
     python -m benchmarks.diagnosis.world_page
 
