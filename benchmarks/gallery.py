@@ -46,7 +46,7 @@ class Shown:
 GALLERY = (
     Shown(title="A trial with its cable and without", commands=("subzero compare fig6",), folder="fig6",
           figures=("fig6", "attitude", "cable", "tension", "forces")),
-    Shown(title="Beside a record", folder="measured", figures=("measured",),
+    Shown(title="Compared with a record", folder="measured", figures=("measured",),
           commands=("subzero challenge fig6 --seed 38 --out hidden",
                     "subzero compare fig6 --measured hidden/record.csv --out measured")),
     Shown(title="A run from its file", commands=("subzero compare fig6",
