@@ -40,15 +40,18 @@ A_NOUN = r"(?-i:\bwhat is\b)(?![^.]*\?)"
 """The phrase used as a noun, not as a question."""
 PROSE = re.compile("|".join([rf"\b(?:{word})\b" for word in PLAIN_WORDS] + [A_NOUN]), re.IGNORECASE)
 IN_NAMES = frozenset(
-    ("told", "tell", "tells", "beside", "heed", "befall", "befalls", "nobody", "stays", "begun", "yardstick", "firm")
-    + ("room", "promise", "promised", "hope", "hopes", "astray", "outside", "unbroken")
+    "told tell tells beside heed befall befalls nobody stays begun yardstick firm room promise promised hope hopes "
+    "astray outside unbroken".split()
 )
 """Parts of a name that are private words."""
 
 
 def pages() -> dict[str, str]:
     """Return the text of the user's pages by their paths, without code."""
-    paths = [*sorted((ROOT / "docs").glob("*.md")), *(ROOT / f"{n}.md" for n in ("README", "VISION", "CONTRIBUTING"))]
+    paths = [
+        *sorted((ROOT / "docs").glob("*.md")),
+        *(ROOT / f"{n}.md" for n in ("README", "VISION", "CONTRIBUTING")),
+    ]
     texts = {str(path.relative_to(ROOT)): path.read_text(encoding="utf-8") for path in paths}
     texts["docs/architecture.md"] = texts["docs/architecture.md"].partition("| says | means |")[0]
     texts["CHANGELOG.md, the top"] = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").split("\n## ")[2]
@@ -100,7 +103,9 @@ def docstrings(path: Path, tree: ast.Module) -> list[str]:
 def messages(path: Path, tree: ast.Module) -> list[str]:
     """Return the texts of a file that are no docstrings and have a space in them."""
     documented = {id(node.value) for node in ast.walk(tree) if _is_docstring(node)}
-    texts = [node for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)]
+    texts = [
+        node for node in ast.walk(tree) if isinstance(node, ast.Constant) and isinstance(node.value, str)
+    ]
     return [text.value for text in texts if id(text) not in documented and " " in text.value.strip()]
 
 

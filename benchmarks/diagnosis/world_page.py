@@ -127,7 +127,7 @@ def of_world(results: Rows) -> list[Score]:
     chance = scores.by_chance(stated) if results else np.zeros(1)
     low, middle, high = np.percentile(chance, [2.5, 50.0, 97.5])
     return [
-        share("healthy: named, called outside, or an error reported", healthy, world.is_false_alarm, "≤ 1 %", most=0.01),
+        share("healthy: named, outside, or an error reported", healthy, world.is_false_alarm, "≤ 1 %", most=0.01),
         share("one cause, D ≥ 25: right first", clear, world.is_right, "≥ 95 %", least=0.95),
         share("wrong with p ≥ 0.95", results, world.is_confidently_wrong, "≤ 1 %", most=0.01),
         Score("probabilities: mean error of calibration", f"{error:.3f}", "≤ 0.03", "–", len(results), error <= 0.03,

@@ -1,7 +1,8 @@
 """The page of the autopilots says what a flight gives.
 
-Verifies: that every section of `python -m benchmarks.autopilot` can be measured, and that docs/autopilot_measured.md
-shows the factors that are asked for; that the example of docs/autopilot.md runs. Tolerance: the factors of 5 and 3; 3 degrees for noisy sensors.
+Verifies: that every section of `python -m benchmarks.autopilot` can be measured; that docs/autopilot_measured.md shows
+the factors that are asked for; that the example of docs/autopilot.md runs. Tolerance: the factors of 5 and 3; 3 degrees
+for noisy sensors.
 """
 
 import subprocess

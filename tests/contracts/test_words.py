@@ -54,10 +54,15 @@ def test_private_words_are_found_in_a_text(text, expected):
 def test_private_words_are_found_in_names_docstrings_and_messages(tmp_path):
     path = tmp_path / "room_left.py"
     path.write_text(
-        'def told(count, one=1):\n    """It stays."""\n    raise ValueError("nobody is told")\n', encoding="utf-8"
+        'def told(count, one=1):\n    """It stays."""\n    raise ValueError("nobody is told")\n',
+        encoding="utf-8",
     )
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    assert {name for name in words.names(path, tree) if words.is_private(name)} == {"room_left", "told", "one"}
+    assert {name for name in words.names(path, tree) if words.is_private(name)} == {
+        "room_left",
+        "told",
+        "one",
+    }
     assert words.docstrings(path, tree) == ["It stays."]
     assert words.messages(path, tree) == ["nobody is told"]
     assert not words.is_private("minimum_bend_radius")
