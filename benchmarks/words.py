@@ -39,9 +39,8 @@ PLAIN_WORDS = {
 A_NOUN = r"(?-i:\bwhat is\b)(?![^.]*\?)"
 """The phrase used as a noun, not as a question."""
 PROSE = re.compile("|".join([rf"\b(?:{word})\b" for word in PLAIN_WORDS] + [A_NOUN]), re.IGNORECASE)
-IN_NAMES = frozenset(
-    "told tell tells beside heed befall befalls nobody stays begun yardstick firm room promise promised hope hopes "
-    "astray outside unbroken".split()
+IN_NAMES = re.compile(
+    "told|tells?|beside|heed|befalls?|nobody|stays|begun|yardstick|firm|room|promised?|hopes?|astray|outside|unbroken"
 )
 """Parts of a name that are private words."""
 
@@ -90,7 +89,7 @@ def names(path: Path, tree: ast.Module) -> set[str]:
 def is_private(name: str) -> bool:
     """Say whether a name is `one`, or has a private word in it."""
     parts = re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)
-    return name == "one" or not IN_NAMES.isdisjoint(part.lower() for part in parts)
+    return name == "one" or any(IN_NAMES.fullmatch(part.lower()) for part in parts)
 
 
 def docstrings(path: Path, tree: ast.Module) -> list[str]:

@@ -70,8 +70,9 @@ def steady_motion() -> str:
         " of the hull: the poles in which its states have more than half (participation factors); the others are"
         " transverse modes of the cable, hardly damped, and the bearing from the drum. Without a cable the heading"
         " integrates, 0. On a cable it does not: the cable pulls it back to the line from the drum, and the hull"
-        " swings about that line. What is left at 0 is that everything, the cable with it, may be turned about the drum. (The 0 of"
-        " pitch_heave is the depth.)\n\n" + table(("speed [m/s]", "cable [m]", *autopilot.SUBSYSTEMS), poles)
+        " swings about that line. What is left at 0 is that everything, the cable with it, may be turned about the drum."
+        " (The 0 of pitch_heave is the depth.)\n\n"
+        + table(("speed [m/s]", "cable [m]", *autopilot.SUBSYSTEMS), poles)
     )
 
 
@@ -295,8 +296,8 @@ def wrong_models(seeds: int = SEEDS) -> str:
         " median of how much smaller the error is than with feedback alone. The autopilot believes the model of the"
         " scenario and perfect sensors. The last line of each block has the same error and no cable: the error left"
         " there is no matter of the cable (noise of the sensors; a speed log that speaks of the ground, in a current),"
-        " and nothing fed forward takes it away. A factor below 1 says that what was fed forward made it worse: in a wide"
-        " turn through a current that is not known, the cable lies elsewhere than believed.\n\n"
+        " and nothing fed forward takes it away. A factor below 1 says that what was fed forward made it worse: in a"
+        " wide turn through a current that is not known, the cable lies elsewhere than believed.\n\n"
         + table(head, rows)
     )
 
