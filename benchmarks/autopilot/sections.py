@@ -70,8 +70,8 @@ def steady_motion() -> str:
         " of the hull: the poles in which its states have more than half (participation factors); the others are"
         " transverse modes of the cable, hardly damped, and the bearing from the drum. Without a cable the heading"
         " integrates, 0. On a cable it does not: the cable pulls it back to the line from the drum, and the hull"
-        " swings about that line. What is left at 0 is that everything, the cable with it, may be turned about the drum."
-        " (The 0 of pitch_heave is the depth.)\n\n"
+        " swings about that line. What is left at 0 is that everything, the cable with it, may be turned about the"
+        " drum. (The 0 of pitch_heave is the depth.)\n\n"
         + table(("speed [m/s]", "cable [m]", *autopilot.SUBSYSTEMS), poles)
     )
 
