@@ -12,7 +12,7 @@ import io
 import random
 import re
 import tokenize
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -67,10 +67,11 @@ def private_words(text: str) -> list[str]:
     return [found[0].lower() for found in PROSE.finditer(text)]
 
 
-def sources() -> Iterator[tuple[Path, ast.Module]]:
-    """Give the files of the product with their trees."""
-    for path in sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
-        yield path, ast.parse(path.read_text(encoding="utf-8"))
+@cache
+def sources() -> tuple[tuple[Path, ast.Module], ...]:
+    """Return the files of the product with their trees."""
+    paths = sorted(path for package in PACKAGES for path in (ROOT / package).rglob("*.py"))
+    return tuple((path, ast.parse(path.read_text(encoding="utf-8"))) for path in paths)
 
 
 def names(path: Path, tree: ast.Module) -> set[str]:
@@ -113,6 +114,7 @@ def _is_docstring(node: ast.AST) -> bool:
     return is_text and isinstance(node.value.value, str)
 
 
+@cache
 def counts() -> dict[str, int]:
     """Return how many private words there are: in pages, in names (each once a file), in docstrings, in messages."""
     found = {"pages": sum(len(private_words(text)) for text in pages().values()), "names": 0}
