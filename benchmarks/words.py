@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("subzero", "cable", "vehicle", "scenarios")
 PLAIN_WORDS = {
     r"told": "reported, stated, commanded",
-    r"tells?(?! apart)(?! them)": "reports, states, shows",
+    r"tells?(?! (?:\w+ ){0,4}apart)": "reports, states, shows",
     r"beside": "with, added to, compared with, next to",
     r"heed(?:s|ed)?": "handle a signal",
     r"befall(?:s|en)?": "happen to",

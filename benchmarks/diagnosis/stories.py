@@ -18,6 +18,7 @@ import numpy as np
 
 import subzero
 from benchmarks.diagnosis.story_cases import STORIES, Story
+from benchmarks.gallery import small
 from subzero import write_diagnosis
 from subzero.channels import BY_NAME
 from subzero.cli_diagnosis import simulated
@@ -66,14 +67,15 @@ def tell(story: Story, verdict: Verdict) -> str:
     missed = "" if verdict.verdict == story.expected else f" *It should have been {story.expected}.*"
     lines += [f"**{words.headline(verdict)}.**{missed}", ""]
     for answer in summary(verdict, story.trial.__name__):
-        lines += [f"> *{answer.question}?* {' '.join(answer.words)}\n>"]
+        lines += [f"> *{answer.question}:* {re.sub(':$', '.', ' '.join(answer.words))}\n>"]
     lines += ["", *(table(tables.rivals(verdict, short=True)) if verdict.rivals else [])]
     for name in story.figures:
         if name in drawn:
-            drawn[name].savefig(FIGURES / f"diagnosis_{story.name}.png", pil_kwargs={"compress_level": 9})
+            path = FIGURES / f"diagnosis_{story.name}.png"
+            drawn[name].savefig(path)
+            path.write_bytes(small(path))
             lines += [f"![{name}](figures/diagnosis_{story.name}.png)", ""]
-    spent = sum(verdict.seconds.values())
-    return "\n".join([*lines, f"Found in {spent:.0f} s.", ""])
+    return "\n".join([*lines, ""])
 
 
 def write(sections: dict[str, str]) -> None:
