@@ -1,7 +1,6 @@
 """What the cable costs: a node, a simulated second at a given error, an hour of pay-out.
 
-    python -m benchmarks.cable            prints the tables
-    python -m benchmarks.cable --figure   draws docs/figures/cable_cost.png as well
+    python -m benchmarks.cable
 
 Times are those of the processor in a warm process, the least of several runs: machines are shared, so nothing is
 asserted. An error is that of the tow force, as a vector, against a run of the same scheme with far smaller segments and
@@ -11,10 +10,8 @@ kinks of the motion at 10 and 20 s. What others cost: `python -m benchmarks.peer
 
 from __future__ import annotations
 
-import sys
 from functools import cache
 from math import cos, radians, sin
-from pathlib import Path
 from time import process_time
 
 import numpy as np
@@ -22,7 +19,6 @@ import numpy as np
 import cable
 
 REPEATS = 5
-FIGURE = Path(__file__).parent.parent / "docs" / "figures" / "cable_cost.png"
 DURATION = 30.0
 
 
@@ -182,30 +178,6 @@ def long_runs():
             yield f"{minutes}", f"{grading:g}", f"{run.length[-1]:.0f}", f"{nodes}", *cost, f"{force:.4f}"
 
 
-def draw(grown):
-    """Draw the seconds of `long_runs` against the length."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(5.5, 3.4), dpi=110, layout="constrained")
-    axes = figure.subplots()
-    for grading, label in (
-        ("0", "segments of 1 m"),
-        ("0.02", "growing by 2 % of the distance to the tow point"),
-    ):
-        rows = [row for row in grown if row[1] == grading]
-        axes.loglog([float(row[2]) for row in rows], [float(row[4]) for row in rows], "o-", label=label)
-    lengths = np.array([60.0, 3600.0])
-    axes.loglog(lengths, lengths, "k:", lw=0.8, label="real time, 1 m/s")
-    axes.set(xlabel="cable at the end [m]", ylabel="processor time of the run [s]")
-    axes.legend(frameon=False)
-    FIGURE.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(FIGURE, metadata={"Software": None})
-    print(f"\nWritten: {FIGURE}")
-
-
 if __name__ == "__main__":
     columns = ("segments", "iterations per step", "µs per node and iteration")
     table("A node of a Newton iteration", columns, per_node())
@@ -221,6 +193,4 @@ if __name__ == "__main__":
     columns += ("worst error", "within 1e-3 (pay-out), 2e-4 (tow)")
     table("Error against cost: the dive of section 4.1", columns, manoeuvres())
     columns = ("minutes", "grading", "cable at the end [m]", "nodes", "seconds", "of real time", "T(0) [N]")
-    rows = table("Pay-out at 1 m/s, steps of 0.5 s", columns, long_runs())
-    if "--figure" in sys.argv:
-        draw(rows)
+    table("Pay-out at 1 m/s, steps of 0.5 s", columns, long_runs())

@@ -5,14 +5,15 @@
 Writes ``docs/gallery.md`` and its pictures in ``docs/figures``: the commands of the table are run in an empty folder,
 one after the other, then the scripts of ``examples/``, and what is shown of each is taken from there; of some only, if
 their folders are named (``examples`` for the scripts). Pictures that are not made keep their place on the page. With
---width the page stays, and figures are made as narrow as one column of a journal page, into ``build/gallery``, to be
-looked at. Three diagnoses and two sweeps take some minutes.
+--width figures are made as narrow as one column of a journal page, into ``build/gallery``, and the page is not written.
+Three diagnoses and a sweep take some minutes. No figure is of a run with warnings.
 """
 
 from __future__ import annotations
 
 import ast
 import io
+import re
 import runpy
 import shlex
 import shutil
@@ -46,7 +47,7 @@ class Shown:
 GALLERY = (
     Shown(title="A trial with its cable and without", commands=("subzero compare fig6",), folder="fig6",
           figures=("fig6", "attitude", "cable", "tension", "forces")),
-    Shown(title="Beside a record", folder="measured", figures=("measured",),
+    Shown(title="Compared with a record", folder="measured", figures=("measured",),
           commands=("subzero challenge fig6 --seed 38 --out hidden",
                     "subzero compare fig6 --measured hidden/record.csv --out measured")),
     Shown(title="A run from its file", commands=("subzero compare fig6",
@@ -55,15 +56,13 @@ GALLERY = (
     Shown(title="A prescribed motion that has an exact solution", commands=("subzero simulate fig4",), folder="fig4",
           figures=("fig4",)),
     Shown(title="A prescribed dive", commands=("subzero simulate fig5",), folder="fig5", figures=("fig5",)),
-    Shown(title="A winch on a vessel", commands=("subzero simulate rov_umbilical",), folder="rov_umbilical",
+    Shown(title="A winch", commands=("subzero simulate winch_trial.toml",), folder="winch_trial",
           figures=("deployment", "cable")),
     Shown(title="A manoeuvre", commands=("subzero manoeuvre zigzag",), folder="zigzag", figures=("manoeuvre",)),
     Shown(title="An autopilot", commands=("subzero autopilot heading_step --autopilot lqr --feed-forward model",),
           folder="heading_step", figures=("manoeuvre",)),
     Shown(title="A sweep", commands=("subzero sweep cable_and_current.toml --out sweep",), folder="sweep",
-          figures=("bands", "histograms", "against")),
-    Shown(title="What matters", commands=("subzero sweep what_matters.toml --out matters",), folder="matters",
-          figures=("tornado",)),
+          figures=("bands", "histograms", "against", "tornado")),
     Shown(title="A diagnosis that names the cause", folder="found",
           commands=("subzero challenge fig6 --seed 38 --out hidden",
                     "subzero diagnose fig6 hidden/record.csv --out found"),
@@ -83,13 +82,24 @@ EXAMPLES = (
 )  # fmt: skip
 """The scripts of ``examples/``, in the order of the page."""
 
+CAPTIONS = {
+    "measured": "Other channels that were measured, with the runs",
+    "misfit": "Measured and simulated values, and the residual with the noise and the resolution of the sensor",
+    "rivals": "The record as each other explanation predicts it",
+    "shape3d": "The cable in space, at several times",
+    "motion": "The motion of the vehicle over time",
+    "heading": "One channel over time",
+}
+"""Captions where a figure needs other words than on its page."""
+
 HEAD = """# Gallery
 
-Every kind of figure, with the command that makes it; below them [examples in Python](#examples-in-python). Each command
-also writes `report.html`, with these figures and a replay ([what it shows](page.md)). `simulate` and `compare` take
-`--width 3.4` for one column of a journal page, and `--figures pdf` or `svg`; in Python every figure takes
-`with subzero.figures.page_width(3.4):`.
-`python -m benchmarks.gallery` runs the commands and makes this page anew.
+Every kind of figure, with the command that makes it, of runs without warnings; below them
+[examples in Python](#examples-in-python). Each command also writes `report.html`, with these figures and a replay
+([what it shows](page.md)). `simulate` and `compare` take `--width 3.4` for one column of a journal page, and
+`--figures pdf` or `svg`; in Python every figure takes `with subzero.figures.page_width(3.4):`.
+`python -m benchmarks.gallery` runs the commands and writes this page. Trials and sweeps that a command names are in
+`examples/` and `scenarios/sweeps/`.
 
 ![The replay of a page](figures/page_follows.png)
 """
@@ -107,12 +117,13 @@ def main() -> None:
     out = NARROW if narrow else PICTURES
     out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
-        for sweep in (Path(scenarios.__file__).parent / "sweeps").glob("*.toml"):
-            shutil.copy(sweep, folder)
+        for file in (*(Path(scenarios.__file__).parent / "sweeps").glob("*.toml"), *SCRIPTS.glob("*.toml")):
+            shutil.copy(file, folder)
         with page_width(narrow) if narrow else nullcontext():
             for command in dict.fromkeys(command for one in wanted for command in one.commands):
                 run(command)
         for one in wanted:
+            refuse_warnings(Path(one.folder) / "summary.json")
             for name in one.figures:
                 (out / picture(one, name)).write_bytes(small(Path(one.folder) / f"{name}.png"))
         if not narrow and (not words or "examples" in words):
@@ -128,6 +139,13 @@ def run(command: str) -> None:
     print(command, flush=True)
     if main([*shlex.split(command)[1:], "--quiet"]) != FINE:
         raise SystemExit(f"This failed: {command}")
+
+
+def refuse_warnings(summary: Path) -> None:
+    """End if a run or a sweep was warned of: the gallery shows none of these."""
+    text = summary.read_text(encoding="utf-8") if summary.exists() else ""
+    if re.search(r'"warnings": (\[[^\]]|\{[^}])', text):
+        raise SystemExit(f"{summary} has warnings.")
 
 
 def draw_examples() -> None:
@@ -162,6 +180,11 @@ def small(path: Path) -> bytes:
     return held.getvalue()
 
 
+def words_of(figure: str) -> str:
+    """Return the caption of a figure."""
+    return CAPTIONS.get(figure) or caption(figure)
+
+
 def page() -> str:
     """Return the page: commands and pictures of every part, as far as they are there."""
     parts = [HEAD]
@@ -169,7 +192,7 @@ def page() -> str:
         lines = "\n".join(one.commands)
         parts.append(f"## {one.title}\n\n```sh\n{lines}\n```\n")
         parts += [
-            f"![{caption(name.removeprefix('tethered_'))}](figures/{picture(one, name)})\n"
+            f"![{words_of(name.removeprefix('tethered_'))}](figures/{picture(one, name)})\n"
             for name in one.figures
             if (PICTURES / picture(one, name)).exists()
         ]

@@ -1,93 +1,84 @@
-"""How easy the code is to carry on, in figures: sizes, import chains, circles, parameters, docstrings, tests.
+"""How easy the code is to carry on, in figures: sizes and their budgets, import chains, constants, comments, words.
 
-    python -m benchmarks.house                   # figures and targets; what stands behind them with --list, --lone
-    python -m benchmarks.house --json house.json
+    python -m benchmarks.house                   # figures of each package, and what is asked for with what is found
+    python -m benchmarks.house --list            # the names behind the counts
 
-figure            what it counts
-----------------  -----------------------------------------------------------------------------------------------------
-lines             of source that are not blank
-files/1000        files in a thousand of them
-floors            modules on the longest chain of imports inside the package; imports inside functions count, those for
-                  types only (``TYPE_CHECKING``) do not; a name that a face hands on counts as an import of the module
-                  that defines it; a circle counts as one
-circles           sets of modules that import one another, by any import
-lone              modules with exactly one importer in the whole product (faces, ``__init__``, left out): fine if they
-                  are a whole concept, which a file of fewer than 80 lines is not, unless it is a row of a table that is
-                  meant to be added to: the catalogue of effects
-> 7 parameters    functions outside compiled kernels, ``self`` left out
-doc/source        lines of docstrings by lines
-test/source       lines of tests by lines; those of a test file are shared out over the packages that it imports
-engine faces      tests of a package whose file imports the faces of its rooms, and nothing below (of the diagnosis
-                  ``subzero.diagnosis.inference``, ``subzero.diagnosis.assessment`` and ``subzero.diagnosis.report``)
-below             tests of a package whose file imports more of it than its faces (a face: ``cable``, ``subzero``,
-                  ``subzero.autopilot``, …, what a user imports)
-
-"subzero, rest" is what stands in no package of its own row. The last row is the whole product. Below the table stands
-what is asked for, with its target.
+lines        of source that are not blank; "/1000": files in a thousand of them
+floors       modules on the longest chain of imports inside a package; imports inside functions count, those for types
+             (``TYPE_CHECKING``) do not; a name that a face hands on counts as its module's; a circle counts as one
+circles      sets of modules that import one another, by any import
+lone         modules with one importer and fewer than 80 lines: parts of it. Faces and rows of tables are left out
+> 7 par.     functions with more parameters, outside compiled kernels
+tests        of a package; "below": those whose file imports more of it than its faces, what a user imports
+constants    numbers as `benchmarks.constants` counts them; modules that are tables of settings are left out
+comments     lines with a comment that is not for a linter; private words: see `benchmarks.words`
 """
 
 from __future__ import annotations
 
 import argparse
 import ast
-import json
+import io
+import re
+import tokenize
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import cache, cached_property
+from math import inf
 from pathlib import Path
+
+from benchmarks import constants, words
 
 ROOT = Path(__file__).resolve().parents[1]
 PRODUCT = ("subzero", "cable", "vehicle", "scenarios")
-ROWS = (
-    "cable",
-    "vehicle",
-    "scenarios",
-    "subzero.autopilot",
-    "subzero.calibration",
-    "subzero.diagnosis",
-    "subzero.page",
-    "subzero.records",
-    "subzero.sweeps",
-    "subzero.synthetic",
-    "subzero",
-)
+INSIDE = ("autopilot", "calibration", "diagnosis", "page", "records", "sweeps", "synthetic")
+ROWS = ("cable", "vehicle", "scenarios", *(f"subzero.{name}" for name in INSIDE), "subzero")
 """Packages with a row of their own; a module belongs to the first that holds it."""
-ENGINE_FACES = ("subzero.diagnosis.inference", "subzero.diagnosis.assessment", "subzero.diagnosis.report")
-"""Packages whose tests import what their ``__all__`` names."""
 REST, ALL = "subzero, rest", "all"
+FACES = {
+    *ROWS,
+    "subzero.jit",
+    "subzero.errors",
+    "subzero.diagnosis.inference",
+    "subzero.diagnosis.assessment",
+}
+FACES |= {"subzero.diagnosis.report"}
+"""Modules that tests of a package may import."""
 COMPILERS = {"compiled", "inner", "inlined", "allocating", "intrinsic"}
 MOST_PARAMETERS = 7
 SHORT_LINES = 80
-"""A file with one importer and fewer lines than this is no whole concept, but a part of its importer."""
 TABLES = ("subzero.diagnosis.hypothesis.catalogue",)
 """Packages whose files are rows of a table, one file for each part of the vehicle."""
 
+BUDGETS = {
+    "jit": (r"subzero\.jit\b", 350),
+    "files, interrupts, checkpoint": (
+        r"subzero\.files\b|.*\.(checkpoint|atomic_output|interrupts|unbroken|user_file|overview)$", 600),
+    "sweeps": (r"subzero\.sweeps\b", 1700),
+    "trust": (r"subzero\.validity\b|.*\.(convergence|refinement)$", 550),
+    "cable": (r"cable\b", 7200),
+    "vehicle": (r"vehicle\b", 1800),
+    "scenarios": (r"scenarios\b", 2100),
+    "command line and what it writes": (r"subzero\.(cli|write_|voice$|progress$|__main__$)", 1900),
+    "explore": (r"subzero\.explore|.*\.local_access$", 600),
+    "figures": (r"subzero\.figures\b|.*\.accessor$", 1300),
+    "diagnosis": (r"subzero\.diagnosis\b", 12000),
+    "calibration": (r"subzero\.calibration\b", 1100),
+    "autopilot": (r"subzero\.autopilot\b|.*\.gym_environment$", 2800),
+    "import of logs": (r"subzero\.logs\b", 1200),
+    "the rest": (r".*", 6600),
+}  # fmt: skip
+"""Part of the product → its modules, those of no part before it, and how many lines they may have."""
+COMMENTED = (
+    r"subzero\.(jit|validity)\b|subzero\.diagnosis\..*noise|.*\.(block_solver|convergence|refinement)$"
+)
+"""Modules that are subtle."""
+SETTINGS_LIKE = r".*\.(settings|quantities|channels|catalogue\..*)$"
+"""Modules that are tables of numbers with their meaning."""
+FOR_LINTERS = re.compile(r"#\s*(noqa|fmt:|type:|pragma)")
+
 Graph = dict[str, set[str]]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Figures:
-    """The figures of one package; lists name what is counted."""
-
-    files: int
-    lines: int
-    files_per_1000: float
-    floors: int
-    chain: list[str]
-    circles: list[list[str]]
-    lone: dict[str, int]
-    many_parameters: list[str]
-    doc_by_source: float
-    test_by_source: float
-    tests: int
-    tests_at_engine_faces: int
-    tests_below_faces: int
-
-    @property
-    def short_lone(self) -> list[str]:
-        """The lone modules that are too short to be a whole concept by themselves, and no rows of a table."""
-        short = [name for name, lines in self.lone.items() if lines < SHORT_LINES]
-        return [name for name in short if name.rpartition(".")[0] not in TABLES]
 
 
 class Module:
@@ -95,21 +86,15 @@ class Module:
 
     def __init__(self, path: Path, name: str) -> None:
         self.path, self.name = path, name
-        text = path.read_text(encoding="utf-8")
-        self.tree = ast.parse(text)
-        self.lines = sum(1 for line in text.splitlines() if line.strip())
+        self.text = path.read_text(encoding="utf-8")
+        self.tree = ast.parse(self.text)
+        self.lines = sum(1 for line in self.text.splitlines() if line.strip())
 
-    @property
-    def docstring_lines(self) -> int:
-        """Count lines of docstrings, those of constants (a text behind an assignment) too."""
-        texts = [
-            node.value
-            for node in ast.walk(self.tree)
-            if isinstance(node, ast.Expr)
-            and isinstance(node.value, ast.Constant)
-            and isinstance(node.value.value, str)
-        ]
-        return sum((text.end_lineno or text.lineno) - text.lineno + 1 for text in texts)
+    @cached_property
+    def comments(self) -> int:
+        """Lines with a comment that is not for a linter."""
+        tokens = tokenize.generate_tokens(io.StringIO(self.text).readline)
+        return sum(token.type == tokenize.COMMENT and not FOR_LINTERS.match(token.string) for token in tokens)
 
     def imports(self, names: Names, *, types: bool = False) -> set[str]:
         """Return the modules of the product that this one imports; with `types`, those for types only too."""
@@ -145,12 +130,16 @@ class Module:
 
 
 def _nodes(tree: ast.AST, types: bool) -> Iterator[ast.AST]:
-    """Give all nodes of a tree, without what is for types only unless `types`."""
+    """Give all nodes of a tree, without those for types only unless `types`."""
     for node in ast.iter_child_nodes(tree):
         is_for_types = isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
         if types or not is_for_types:
             yield node
             yield from _nodes(node, types)
+
+
+def _is_compiled(node: ast.FunctionDef) -> bool:
+    return any(isinstance(each, ast.Name) and each.id in COMPILERS for each in node.decorator_list)
 
 
 @dataclass(frozen=True)
@@ -163,14 +152,11 @@ class Names:
     @classmethod
     def of(cls, product: dict[str, Module]) -> Names:
         """Return the names of a product."""
-        homes = {name: home for one in product.values() for name, home in one.hands_on().items()}
+        homes = {name: home for module in product.values() for name, home in module.hands_on().items()}
         return cls(frozenset(product), {name: home for name, home in homes.items() if home in product})
 
 
-def _is_compiled(node: ast.FunctionDef) -> bool:
-    return any(isinstance(each, ast.Name) and each.id in COMPILERS for each in node.decorator_list)
-
-
+@cache
 def modules(folder: Path, root: Path = ROOT) -> dict[str, Module]:
     """Return the modules in a folder by their dotted names."""
     found = {}
@@ -185,7 +171,7 @@ def circles(graph: Graph) -> list[list[str]]:
     """Return the sets of modules that import one another (strongly connected), each sorted."""
     ahead = {name: _reached(graph, name) for name in graph}
     found = {tuple(sorted(other for other in ahead[name] if name in ahead[other])) for name in graph}
-    return [list(one) for one in sorted(found) if len(one) > 1]
+    return [list(circle) for circle in sorted(found) if len(circle) > 1]
 
 
 def _reached(graph: Graph, start: str) -> set[str]:
@@ -206,7 +192,7 @@ def longest_chain(graph: Graph) -> list[str]:
         if name not in floors:
             members = [each for each in graph if as_one.get(each, each) == name]
             under = {as_one.get(other, other) for each in members for other in graph[each] & graph.keys()}
-            floors[name] = [name, *max((below(one) for one in under - {name}), key=len, default=[])]
+            floors[name] = [name, *max((below(other) for other in under - {name}), key=len, default=[])]
         return floors[name]
 
     return max((below(as_one.get(name, name)) for name in graph), key=len, default=[])
@@ -218,125 +204,119 @@ def row_of(name: str) -> str:
     return REST if row == "subzero" else row
 
 
-PUBLIC, ENGINE, BELOW = 0, 1, 2
-"""How deep a test reaches into a package: no farther than its face, to the faces of its engine, or below."""
+@dataclass(frozen=True, kw_only=True)
+class Figures:
+    """The figures of one package; lists name what is counted."""
 
-
-def depth_of(name: str) -> int:
-    """Say how deep in its package a module is."""
-    if name in (*ROWS, "subzero.jit", "subzero.errors"):
-        return PUBLIC
-    return ENGINE if name in ENGINE_FACES else BELOW
-
-
-@dataclass(frozen=True)
-class TestFile:
-    """A file of tests: how many, how many lines, and how deep it reaches into each row."""
-
-    tests: int
+    files: int
     lines: int
-    depths: dict[str, int]
+    chain: list[str]
+    circles: list[list[str]]
+    short_lone: list[str]
+    many_parameters: list[str]
+    tests: int
+    tests_below_faces: int
 
-    def reaches(self, row: str) -> int:
-        """Return how deep it reaches into a row; into any, for all."""
-        return max(self.depths.values(), default=PUBLIC) if row == ALL else self.depths[row]
+    @property
+    def floors(self) -> int:
+        """Modules on the longest chain of imports."""
+        return len(self.chain)
+
+    @property
+    def files_per_1000(self) -> float:
+        """Files in a thousand lines."""
+        return 1000.0 * self.files / self.lines
 
 
-def test_files(names: Names) -> list[TestFile]:
-    """Return all files of tests; helpers without tests count by their lines. What a test has from a face is the face's,
-    wherever that has it from.
-    """
-    found, as_written = [], Names(names.modules, {name: name.rpartition(".")[0] for name in names.homes})
-    for module in modules(ROOT / "tests").values():
-        tests = sum(
-            isinstance(node, ast.FunctionDef) and node.name.startswith("test_")
-            for node in ast.walk(module.tree)
-        )
-        depths: dict[str, int] = defaultdict(int)
-        for name in module.imports(as_written, types=True):
-            depths[row_of(name)] = max(depths[row_of(name)], depth_of(name))
-        found.append(TestFile(tests, module.lines, dict(depths)))
-    return found
+@cache
+def product() -> dict[str, Module]:
+    """Return the modules of the four packages."""
+    return {name: module for package in PRODUCT for name, module in modules(ROOT / package).items()}
 
 
 def figures() -> dict[str, Figures]:
     """Return the figures of every row, and of the whole product."""
-    product = {name: one for package in PRODUCT for name, one in modules(ROOT / package).items()}
-    names = Names.of(product)
-    graph = {name: one.imports(names) for name, one in product.items()}
-    any_import = {name: one.imports(names, types=True) for name, one in product.items()}
+    every = product()
+    names = Names.of(every)
+    graph = {name: module.imports(names) for name, module in every.items()}
     importers: Graph = defaultdict(set)
-    for name, found in any_import.items():
-        for other in found:
+    for name, module in every.items():
+        for other in module.imports(names, types=True):
             importers[other].add(name)
-    tests = test_files(names)
-    rows = [*dict.fromkeys(row_of(name) for name in product), ALL]
-    return {row: _figures(row, product, graph, importers, tests) for row in rows}
+    tests, found = _tests(names), {}
+    for row in [*dict.fromkeys(row_of(name) for name in every), ALL]:
+        inside = [name for name in every if row in (ALL, row_of(name))]
+        own = {name: graph[name] for name in inside}
+        found[row] = Figures(
+            files=len(inside),
+            lines=sum(every[name].lines for name in inside),
+            chain=longest_chain(own),
+            circles=circles(own),
+            short_lone=[name for name in inside if len(importers[name]) == 1 and _is_short(every[name])],
+            many_parameters=[each for name in inside for each in every[name].long_signatures()],
+            tests=sum(count for count, rows, _ in tests if row in rows or row == ALL),
+            tests_below_faces=sum(
+                count for count, _, below in tests if row in below or (row == ALL and below)
+            ),
+        )
+    return found
 
 
-def _figures(
-    row: str, product: dict[str, Module], graph: Graph, importers: Graph, tests: list[TestFile]
-) -> Figures:
-    """Return the figures of one row."""
-    inside = [name for name in product if row in (ALL, row_of(name))]
-    own = {name: graph[name] for name in inside}
-    lines = sum(product[name].lines for name in inside)
-    chain = longest_chain(own)
-    if row == ALL:
-        here, shared = tests, sum(one.lines for one in tests)
-    else:
-        here = [one for one in tests if row in one.depths]
-        shared = sum(one.lines / len(one.depths) for one in here)
-    return Figures(
-        files=len(inside),
-        lines=lines,
-        files_per_1000=1000.0 * len(inside) / lines,
-        floors=len(chain),
-        chain=chain,
-        circles=circles(own),
-        lone={
-            name: product[name].lines
-            for name in inside
-            if len(importers[name]) == 1 and product[name].path.name not in ("__init__.py", "__main__.py")
-        },
-        many_parameters=[each for name in inside for each in product[name].long_signatures()],
-        doc_by_source=sum(product[name].docstring_lines for name in inside) / lines,
-        test_by_source=shared / lines,
-        tests=sum(one.tests for one in here),
-        tests_at_engine_faces=sum(one.tests for one in here if one.reaches(row) == ENGINE),
-        tests_below_faces=sum(one.tests for one in here if one.reaches(row) == BELOW),
-    )
+def _is_short(module: Module) -> bool:
+    is_own = module.path.name not in ("__init__.py", "__main__.py")
+    return is_own and module.lines < SHORT_LINES and module.name.rpartition(".")[0] not in TABLES
+
+
+def _tests(names: Names) -> list[tuple[int, set[str], set[str]]]:
+    """Return, of each file of tests, how many there are, the rows that it imports, and those below their faces."""
+    as_written = Names(names.modules, {name: name.rpartition(".")[0] for name in names.homes})
+    found = []
+    for module in modules(ROOT / "tests").values():
+        functions = [node for node in ast.walk(module.tree) if isinstance(node, ast.FunctionDef)]
+        used = module.imports(as_written, types=True)
+        rows, below = {row_of(name) for name in used}, {row_of(name) for name in used if name not in FACES}
+        found.append((sum(node.name.startswith("test_") for node in functions), rows, below))
+    return found
 
 
 def table(found: dict[str, Figures]) -> str:
     """Return the figures as lines of a table."""
-    head = (
-        f"{'package':<18}{'files':>6}{'lines':>7}{'/1000':>6}{'floors':>7}{'circles':>8}{'lone':>5}"
-        f"{'>7 par.':>8}{'doc':>6}{'test':>6}{'tests':>7}{'engine faces':>14}{'below':>7}"
-    )
+    head = "package             files  lines /1000 floors circles lone >7 par.  tests below"
     rows = [
-        f"{row:<18}{one.files:>6}{one.lines:>7}{one.files_per_1000:>6.1f}{one.floors:>7}{len(one.circles):>8}"
-        f"{len(one.lone):>5}{len(one.many_parameters):>8}{one.doc_by_source:>6.2f}{one.test_by_source:>6.2f}"
-        f"{one.tests:>7}{one.tests_at_engine_faces:>14}{one.tests_below_faces:>7}"
+        f"{row:<20}{one.files:>5}{one.lines:>7}{one.files_per_1000:>6.1f}{one.floors:>7}{len(one.circles):>8}"
+        f"{len(one.short_lone):>5}{len(one.many_parameters):>8}{one.tests:>7}{one.tests_below_faces:>6}"
         for row, one in found.items()
     ]
     return "\n".join([head, *rows])
 
 
+MOST_PLACES = 6
+"""Names that are printed behind a figure without --list."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Goal:
-    """What is asked of a figure: its name, what was found, and the most that it may be; `places` has what is over."""
+    """What is asked of a figure: its name, the value found, and its limits; `places` has the names behind it."""
 
     name: str
     found: float
-    most: float
+    most: float = inf
+    least: float = -inf
     places: tuple[str, ...] = ()
 
-    def line(self) -> str:
-        """Return a line of the table of targets."""
-        met = "met" if self.found <= self.most else "NOT"
-        places = f"  {', '.join(self.places)}" if self.places and met == "NOT" else ""
-        return f"{self.name:<58}{self.found:>7.3g}{self.most:>7.3g}  {met}{places}"
+    @property
+    def is_met(self) -> bool:
+        """Whether the figure is within its limits."""
+        return self.least <= self.found <= self.most
+
+    def line(self, everything: bool = False) -> str:
+        """Return a line of the table of targets, with the names behind it if it is not met, or with `everything`."""
+        limit = f"≤ {self.most:g}" if self.most < inf else f"≥ {self.least:g}" if self.least > -inf else "-"
+        met = "" if limit == "-" else "met" if self.is_met else "NOT"
+        places = self.places if everything else self.places[:MOST_PLACES] if met == "NOT" else ()
+        more = ", …" if len(places) < len(self.places) and places else ""
+        shown = f"  {', '.join(places)}{more}" if places else ""
+        return f"{self.name:<52}{self.found:>9.5g}  {limit:<8}{met:<4}{shown}".rstrip()
 
 
 MOST_FILES_PER_1000 = 7.5
@@ -355,96 +335,115 @@ def scattered(found: dict[str, Figures]) -> dict[str, Figures]:
     }
 
 
-DIAGNOSIS = "subzero.diagnosis"
-NO_ENGINE = ("subzero.diagnosis.hypothesis.catalogue", "subzero.diagnosis.report")
-SETTINGS = "subzero.diagnosis.inference.settings"
-"""The diagnosis, what of it is no engine, and where all settings of its search stand."""
-
-
-def engine_goals() -> list[Goal]:
-    """Return what is asked of the engine of a diagnosis: files, settings of the search, and floors of classes."""
-    inside = {name: one for name, one in modules(ROOT.joinpath(*DIAGNOSIS.split("."))).items()
-              if not name.startswith(NO_ENGINE)}  # fmt: skip
-    settings = [target.id for node in ast.walk(inside[SETTINGS].tree) if isinstance(node, ast.Assign)
-                for target in ast.walk(node) if isinstance(target, ast.Name)]  # fmt: skip
-    bases = {node.name: [ast.unparse(base) for base in node.bases]
-             for one in inside.values() for node in ast.walk(one.tree) if isinstance(node, ast.ClassDef)}  # fmt: skip
-    depth = longest_chain({name: set(own) for name, own in bases.items()})
-    return [
-        Goal(name="files of its engine (without catalogue and report)", found=len(inside), most=45),
-        Goal(name="settings of its search", found=len(settings), most=30),
-        Goal(name="classes below one another in it", found=len(depth) - 1, most=1, places=tuple(depth)),
+def budgets(every: dict[str, Module]) -> list[Goal]:
+    """Return the lines of each part of the product, of the whole and of the benchmarks, with their budgets."""
+    parts: dict[str, list[Module]] = {name: [] for name in BUDGETS}
+    for name, module in every.items():
+        part = next(part for part, (pattern, _) in BUDGETS.items() if re.match(pattern, name))
+        parts[part].append(module)
+    found = [
+        Goal(name="lines: the product", found=sum(module.lines for module in every.values()), most=41000)
     ]
+    for part, (_, most) in BUDGETS.items():
+        found.append(
+            Goal(name=f"lines: {part}", found=sum(module.lines for module in parts[part]), most=most)
+        )
+    lines = sum(module.lines for module in modules(ROOT / "benchmarks").values())
+    return [*found, Goal(name="lines: benchmarks", found=lines, most=7000)]
+
+
+def style_goals(every: dict[str, Module]) -> list[Goal]:
+    """Return what is asked of constants, comments, words and the first level of `subzero`."""
+    own = [module for name, module in every.items() if not re.match(SETTINGS_LIKE, name)]
+    named = {module.name: constants.named(module.tree) for module in own}
+    trees = [module.tree for module in every.values()]
+    most = sorted(named, key=lambda name: -len(named[name]))[:5]
+    subtle = [module for name, module in every.items() if re.match(COMMENTED, name)]
+    direct = [name for name, module in every.items() if module.path.parent == ROOT / "subzero"]
+    skips = [name for name, module in every.items() if "fmt: skip" in module.text]
+    count, lines = words.counts(), sum(module.lines for module in every.values())
+    return [
+        Goal(name="constants: names bound to numbers, without settings", found=sum(map(len, named.values())), most=250,
+             places=tuple(f"{name} {len(named[name])}" for name in most)),
+        Goal(name="constants: defaults of arguments", found=sum(map(constants.defaults, trees))),
+        Goal(name="constants: in bodies of functions", found=sum(map(constants.bare, trees))),
+        Goal(name="% of lines with a comment", found=_commented(list(every.values())), least=2),
+        Goal(name="% … jit, block solver, noise, trust", found=_commented(subtle), least=3,
+             places=tuple(f"{module.name} {_commented([module]):.1f}" for module in subtle)),
+        Goal(name="private words on pages", found=count["pages"], most=0),
+        Goal(name="private words in names", found=count["names"], most=0),
+        Goal(name="private words in docstrings, per 1000 lines", found=1000.0 * count["docstrings"] / lines, most=3),
+        Goal(name="private words in messages, per 1000 lines", found=1000.0 * count["messages"] / lines, most=3),
+        Goal(name="modules directly in subzero/", found=len(direct), most=8, places=tuple(direct)),
+        Goal(name="files with fmt: skip", found=len(skips), most=0, places=tuple(skips)),
+    ]  # fmt: skip
+
+
+def _commented(some: list[Module]) -> float:
+    """Return the share of lines with a comment. [%]"""
+    lines = sum(module.lines for module in some)
+    return 100.0 * sum(module.comments for module in some) / max(lines, 1)
+
+
+ENGINE = r"subzero\.diagnosis\b(?!\.hypothesis\.catalogue|\.report)"
+"""Modules of the diagnosis without those that are words or tables."""
+
+
+def engine_goals(every: dict[str, Module]) -> list[Goal]:
+    """Return what is asked of the engine of a diagnosis: files, settings of the search, and floors of classes."""
+    inside = {name: module for name, module in every.items() if re.match(ENGINE, name)}
+    settings = constants.named(inside["subzero.diagnosis.inference.settings"].tree)
+    classes = [node for m in inside.values() for node in ast.walk(m.tree) if isinstance(node, ast.ClassDef)]
+    depth = longest_chain({node.name: {ast.unparse(base) for base in node.bases} for node in classes})
+    return [
+        Goal(name="diagnosis: files of its engine", found=len(inside), most=45),
+        Goal(name="diagnosis: settings of its search", found=len(settings), most=30),
+        Goal(name="diagnosis: classes below one another", found=len(depth) - 1, most=1, places=tuple(depth)),
+    ]
+
+
+def structure_goals(found: dict[str, Figures]) -> list[Goal]:
+    """Return what is asked of files and imports."""
+    whole, diagnosis = found[ALL], found["subzero.diagnosis"]
+    packages = {
+        row: one for row, one in found.items() if row not in (ALL, *SMALL_FILES) and one.files > FEW_FILES
+    }
+    return [
+        Goal(name="floors of the whole product", found=whole.floors, most=16, places=tuple(whole.chain)),
+        Goal(name="circles", found=len(whole.circles), most=0, places=tuple(map(str, whole.circles))),
+        Goal(name="files per 1000 lines, most in a package but vehicle", most=MOST_FILES_PER_1000,
+             found=max(one.files_per_1000 for one in packages.values()), places=tuple(scattered(packages))),
+        Goal(name=f"lone modules of fewer than {SHORT_LINES} lines", found=len(whole.short_lone), most=0,
+             places=tuple(whole.short_lone)),
+        Goal(name=f"functions with more than {MOST_PARAMETERS} parameters", found=len(whole.many_parameters), most=0,
+             places=tuple(whole.many_parameters)),
+        Goal(name="diagnosis: files", found=diagnosis.files, most=60),
+        Goal(name="diagnosis: floors", found=diagnosis.floors, most=12, places=tuple(diagnosis.chain)),
+        Goal(name="diagnosis: % of tests below its faces", most=10,
+             found=100.0 * diagnosis.tests_below_faces / max(diagnosis.tests, 1)),
+    ]  # fmt: skip
 
 
 def goals(found: dict[str, Figures]) -> list[Goal]:
-    """Return what is asked for, with the figures that stand."""
-    whole, diagnosis = found[ALL], found["subzero.diagnosis"]
-    counted = {
-        row: one for row, one in found.items() if row not in (ALL, *SMALL_FILES) and one.files > FEW_FILES
-    }
-    over = scattered(counted)
-    densest = max(one.files_per_1000 for one in counted.values())
-    return [
-        Goal(name="files of the diagnosis", found=diagnosis.files, most=60),
-        *engine_goals(),
-        Goal(name="floors of the diagnosis", found=diagnosis.floors, most=12),
-        Goal(name="floors of the whole product", found=whole.floors, most=22),
-        Goal(
-            name="files per 1000 lines, most in a package (vehicle left out)",
-            found=densest,
-            most=MOST_FILES_PER_1000,
-            places=tuple(over),
-        ),
-        Goal(name="circles", found=len(whole.circles), most=0),
-        Goal(
-            name=f"lone modules of fewer than {SHORT_LINES} lines",
-            found=len(whole.short_lone),
-            most=0,
-            places=tuple(whole.short_lone),
-        ),
-        Goal(
-            name=f"functions with more than {MOST_PARAMETERS} parameters",
-            found=len(whole.many_parameters),
-            most=0,
-            places=tuple(row for row, one in found.items() if row != ALL and one.many_parameters),
-        ),
-        Goal(
-            name="% of diagnosis tests below its faces",
-            found=100.0 * diagnosis.tests_below_faces / max(diagnosis.tests, 1),
-            most=10,
-        ),
-    ]
+    """Return all that is asked for, with the values found."""
+    every = product()
+    return [*budgets(every), *style_goals(every), *structure_goals(found), *engine_goals(every)]
 
 
-def targets(found: dict[str, Figures]) -> str:
+def targets(asked: list[Goal], everything: bool = False) -> str:
     """Return the targets as lines of a table."""
-    head = f"{'asked for':<58}{'is':>7}{'target':>7}"
-    return "\n".join([head, *(goal.line() for goal in goals(found))])
+    return "\n".join([f"{'asked for':<52}{'found':>9}  target", *(goal.line(everything) for goal in asked)])
 
 
 def main() -> None:
-    """Print the tables, and write the figures as JSON if asked for."""
+    """Print the tables."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--json", type=Path, help="file for all figures, with the names behind the counts")
-    parser.add_argument("--list", action="store_true", help="print the names behind the counts too")
-    parser.add_argument(
-        "--lone", action="store_true", help="print the lone modules of each row, with their lines"
-    )
+    parser.add_argument("--list", action="store_true", help="print the names behind all counts too")
     asked = parser.parse_args()
     found = figures()
-    print(table(found), targets(found), sep="\n\n")
-    if asked.lone:
-        for row, one in found.items():
-            if row != ALL:
-                print(f"\n{row}:", *(f"  {lines:>4} {name}" for name, lines in one.lone.items()), sep="\n")
-    if asked.list:
-        for name in ("chain", "circles", "lone", "many_parameters"):
-            print(f"\n{name}:", *(f"  {each}" for each in getattr(found[ALL], name)), sep="\n")
-    if asked.json:
-        asked.json.write_text(json.dumps({row: asdict(one) for row, one in found.items()}, indent=1))
+    print(table(found), targets(goals(found), asked.list), sep="\n\n")
 
 
 if __name__ == "__main__":

@@ -101,7 +101,7 @@ def _(mo):
         ## What is wrong with this vehicle?
 
         A log: the same trial with a propeller that gives 28 % more thrust, as noisy sensors would show it. The diagnosis
-        is not told what was changed. (`budget="verdict"` takes some ten seconds; without it there are a gain on data
+        does not know the change. (`budget="verdict"` takes some ten seconds; without it there are a gain on data
         that were not fitted and a next trial, too, as `subzero diagnose` has them.)
         """
     )

@@ -1,4 +1,4 @@
-"""Ask what is wrong with a vehicle from its log: the first look of a diagnosis, at a vehicle with more thrust."""
+"""Diagnose a vehicle from its log: the screening of a record of a vehicle with more thrust."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -23,9 +23,8 @@ values = {
 }
 log = subzero.Record(source="a log", time=time, values=values)
 
-verdict = subzero.diagnose(
-    log, "fig6", budget="screen"
-)  # "verdict" and "full" fit and test what this only ranks
+# "screen" only ranks the causes; "verdict" and "full" fit them and test the fits.
+verdict = subzero.diagnose(log, "fig6", budget="screen")
 print(verdict)
 
 likely = sorted(verdict.probabilities.items(), key=lambda item: item[1])[-6:]

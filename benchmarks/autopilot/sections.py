@@ -67,11 +67,12 @@ def steady_motion() -> str:
         "## Steady motion, and poles about it\n\n"
         + table(head, rows)
         + "\nPoles in the vehicle's time scale, λ L/U (actuators included; of a pair the upper one). With a cable those"
-        " of the hull: the poles in which its states have more than half (participation factors); what is left are"
-        " bends of the cable, hardly damped, and the bearing from the drum. Without a cable the heading integrates, 0."
-        " On a cable it does not: the cable pulls it back to the line from the drum, and the hull swings about that"
-        " line. What is left at 0 is that everything, the cable with it, may be turned about the drum. (The 0 of"
-        " pitch_heave is the depth.)\n\n" + table(("speed [m/s]", "cable [m]", *autopilot.SUBSYSTEMS), poles)
+        " of the hull: the poles in which its states have more than half (participation factors); the others are"
+        " transverse modes of the cable, hardly damped, and the bearing from the drum. Without a cable the heading"
+        " integrates, 0. On a cable it does not: the cable pulls it back to the line from the drum, and the hull"
+        " swings about that line. What is left at 0 is that everything, the cable with it, may be turned about the"
+        " drum. (The 0 of pitch_heave is the depth.)\n\n"
+        + table(("speed [m/s]", "cable [m]", *autopilot.SUBSYSTEMS), poles)
     )
 
 
@@ -286,17 +287,17 @@ def wrong_models(seeds: int = SEEDS) -> str:
         for kind in KINDS:
             rows += surviving(name, kind, seeds)
     head = (
-        "flight", "what is wrong", "knows of the cable", "speed error [mm/s]", "worst", "smaller by",
+        "flight", "error of the model", "knows of the cable", "speed error [mm/s]", "worst", "smaller by",
         "heading error [degree]", "worst", "smaller by",
     )  # fmt: skip
     runs = len(rows) * seeds
     return (
         f"## A wrong model\n\n{runs} seeded runs with the PID: medians over {seeds} seeds, the worst seed, and the"
         " median of how much smaller the error is than with feedback alone. The autopilot believes the model of the"
-        " scenario and perfect sensors. The last line of each block has the same wrong and no cable: what is left there"
-        " is no matter of the cable (noise of the sensors; a speed log that speaks of the ground, in a current), and"
-        " nothing fed forward takes it away. A factor below 1 says that what was fed forward made it worse: in a wide"
-        " turn through a current that is not known, the cable lies elsewhere than believed.\n\n"
+        " scenario and perfect sensors. The last line of each block has the same error and no cable: the error left"
+        " there is no matter of the cable (noise of the sensors; a speed log that speaks of the ground, in a current),"
+        " and nothing fed forward takes it away. A factor below 1 says that what was fed forward made it worse: in a"
+        " wide turn through a current that is not known, the cable lies elsewhere than believed.\n\n"
         + table(head, rows)
     )
 

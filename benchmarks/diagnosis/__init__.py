@@ -1,1 +1,1 @@
-"""How well a diagnosis finds hidden effects: ``python -m benchmarks.diagnosis`` writes docs/diagnosis_benchmark.md."""
+"""How often a diagnosis is right: `world_page` writes docs/diagnosis_world.md from what the other modules measured."""

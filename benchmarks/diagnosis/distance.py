@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from subzero.diagnosis.assessment import information, marginal, separation
+from subzero.diagnosis.assessment import separation
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import columns_of, nameable, variances
@@ -56,15 +56,6 @@ def discriminations(problem: Problem, J: np.ndarray, hidden: Hidden) -> dict[str
             if value:
                 J[:, k], z[k] = secant(problem, k, value), value
     return {one: _of(problem, J, z, one, hidden) for one in hidden}
-
-
-def signals(problem: Problem, J: np.ndarray, hidden: Hidden) -> dict[str, float]:
-    """Return cause → squared distance from what the tolerances of all others could do."""
-    M, found = marginal(problem, J), {}
-    for one, values in hidden.items():
-        at, z = columns_of(problem.entries, (one,)), np.array(values)
-        found[one] = float(z @ information(problem, M, at) @ z)
-    return found
 
 
 def _of(problem: Problem, J: np.ndarray, z: np.ndarray, one: str, hidden: Hidden) -> tuple[float, str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 
@@ -29,18 +28,17 @@ def _within(p: Parameter, value: float) -> float:
     return float(np.clip(abs(value) if p.low == 0.0 else value, p.low, p.high))
 
 
-def hidden(rng: np.random.Generator, one: str, sign: int = 0, main: int | None = None) -> tuple[float, ...]:
+def hidden(rng: np.random.Generator, one: str, sign: int = 0) -> tuple[float, ...]:
     """Return the deviations of a hidden effect: one parameter of its size, another anywhere within its scale.
 
     Args:
         rng: random numbers.
         one: the effect.
         sign: of the main parameter, +1 or −1; 0 for any.
-        main: which parameter it is; the others are 0 then.
     """
     parameters = effects()[one].parameters
-    which = int(rng.integers(len(parameters))) if main is None else main
-    found = [0.0 if main is not None else rng.uniform(-1.0, 1.0) * p.scale for p in parameters]
+    which = int(rng.integers(len(parameters)))
+    found = [rng.uniform(-1.0, 1.0) * p.scale for p in parameters]
     found[which] = _size(rng, parameters[which], sign)
     return tuple(float(np.clip(x, p.low, p.high)) for x, p in zip(found, parameters, strict=True))
 
@@ -68,13 +66,3 @@ def with_values(setting: Setting, values: Values, table: Mapping[str, Effect] | 
         if any(numbers):
             setting = table[name].apply(setting, *numbers)
     return setting
-
-
-def with_begun(setting: Setting, values: Values, started: Values, starts: Mapping[str, float]) -> Setting:
-    """Return a setting with deviations, and further ones on top of them, each from a time on. [s]"""
-    models = []
-    for name, time in starts.items():
-        total = [np.clip(a + b, p.low, p.high) for a, b, p in zip(values[name], started[name],
-                                                                  effects()[name].parameters, strict=True)]  # fmt: skip
-        models.append((time, with_values(setting, {**values, name: tuple(map(float, total))}).model))
-    return replace(with_values(setting, values), later=tuple(models))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -17,14 +16,12 @@ from subzero.model import Model
 
 CHANNELS = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 """The six basic ones."""
-FEW = ("surge_speed", "heading")
 BRAKE = 0.1
 """Friction of the drum on `rich`, at its rim, so that it does not run ahead where the vehicle slows. [N]"""
 RATE = 10.0
 """Samples of a record a second. [Hz]"""
-NAMES = ("fig6", "rich")
-OTHER = {"fig6": "rich", "rich": "fig6"}
-"""Where a gain is held out."""
+AFTER = 4.0
+"""A trial goes on behind its record, for sensors whose clock runs ahead. [s]"""
 
 
 @cache
@@ -32,8 +29,6 @@ def nominal(name: str) -> Setting:
     """Return the nominal setting of a manoeuvre."""
     trial = subzero.load_scenario("fig6")
     setting = Setting(trial=trial, model=Model.of(trial))
-    if name == "short":
-        return replace(setting, trial=replace(trial, duration=10.0))
     return braked_rich(setting) if name == "rich" else setting
 
 
@@ -57,9 +52,3 @@ def effects() -> Mapping[str, Effect]:
 def ids() -> tuple[str, ...]:
     """Return all causes that can be named."""
     return tuple(catalogue(CHANNELS))
-
-
-@cache
-def sudden() -> tuple[str, ...]:
-    """Return all causes that may begin in mid-trial."""
-    return tuple(one for one, effect in catalogue(CHANNELS).items() if effect.sudden)

@@ -29,11 +29,10 @@ from subzero.records.record import Record
 
 from .distance import sensitivities, sudden_distance
 from .draws import nuisances, with_values
-from .manoeuvres import CHANNELS
+from .manoeuvres import AFTER, CHANNELS
 from .results import results_of
 from .truth import NoRunError, agreed
 from .world import (
-    AFTER,
     FAMILIES,
     FLOWN,
     Drawn,
@@ -139,11 +138,16 @@ def result_of(one: Drawn) -> dict[str, Any]:
     return found
 
 
+def is_right(one: Mapping[str, Any]) -> bool:
+    """Say whether the most probable cause is the true one, whenever it begins."""
+    return bool(one["first"] == one["cause"])
+
+
 def line_of(one: Mapping[str, Any]) -> str:
     """Return a result as a line."""
     if "error" in one:
         return f"{one['index']:4d} {one['flown']:14} {one['family']:12} {one['cause']} ERROR {one['error']}"
-    mark = "  " if one["first"] == one["cause"] else "! " if is_confidently_wrong(one) else "? "
+    mark = "  " if is_right(one) else "! " if is_confidently_wrong(one) else "? "
     true = f"{one['cause']}@{one['time']:.1f} ({', '.join(f'{z:.2g}' for z in one['values'])})"
     reported = f"{one['verdict']} {one['first']}@{one['began']:.1f} {one['p']:.2f} {one['seconds']:.0f} s"
     distance = f"D {one['D']:.0f} ({one['rival']})"
@@ -156,7 +160,7 @@ def table(results: Sequence[Mapping[str, Any]]) -> str:
     for cause in (*CAUSES, "all"):
         own = [one for one in results if cause in (one["cause"], "all") and "error" not in one]
         clear = [one for one in own if one["D"] >= CLEAR]
-        right, wrong = sum(one["first"] == one["cause"] for one in clear), sum(map(is_confidently_wrong, own))
+        right, wrong = sum(map(is_right, clear)), sum(map(is_confidently_wrong, own))
         rows.append(f"{cause:26s} {len(own):8d} {len(clear):6d} {right:6d} {wrong:7d}")
     return "\n".join(rows)
 

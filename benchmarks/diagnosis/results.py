@@ -8,8 +8,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
-from .trial_of import Result
-
+Result = dict[str, Any]
 DIGITS = 6
 """Significant ones that are kept."""
 
@@ -20,11 +19,6 @@ class Numbered(Protocol):
     @property
     def index(self) -> int:
         """Its number."""
-
-
-def place(seed: int, which: str = "") -> Path:
-    """Return where the results of a seed are kept, or some of them that the page does not rest on."""
-    return Path(__file__).parent / "kept" / f"{which}seed_{seed}.jsonl"
 
 
 def line(one: Result) -> str:

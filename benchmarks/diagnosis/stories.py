@@ -1,4 +1,4 @@
-"""Make the seven stories of docs/diagnosis.md: hide, diagnose, and write what was found between the marks.
+"""Make the seven examples of docs/diagnosis_examples.md: hide, diagnose, and write what was found between the marks.
 
     python -m benchmarks.diagnosis.stories                      # all of them
     python -m benchmarks.diagnosis.stories rudder_lag_on_fig6   # or some
@@ -18,8 +18,9 @@ import numpy as np
 
 import subzero
 from benchmarks.diagnosis.story_cases import STORIES, Story
+from benchmarks.gallery import small
+from subzero import write_diagnosis
 from subzero.channels import BY_NAME
-from subzero.cli import write_diagnosis
 from subzero.cli.diagnosis import simulated
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting
@@ -34,7 +35,7 @@ from subzero.results.netcdf_csv import open_output_folder
 from subzero.synthetic.challenge import SAMPLE_S
 from subzero.synthetic.planted import Hidden, draw_deviations, hide, make_record
 
-PAGE = Path(__file__).parents[2] / "docs" / "diagnosis.md"
+PAGE = Path(__file__).parents[2] / "docs" / "diagnosis_examples.md"
 FIGURES = PAGE.parent / "figures"
 OPEN, CLOSE = "<!-- stories -->", "<!-- end of stories -->"
 
@@ -66,14 +67,15 @@ def tell(story: Story, verdict: Verdict) -> str:
     missed = "" if verdict.verdict == story.expected else f" *It should have been {story.expected}.*"
     lines += [f"**{words.headline(verdict)}.**{missed}", ""]
     for answer in summary(verdict, story.trial.__name__):
-        lines += [f"> *{answer.question}?* {' '.join(answer.words)}\n>"]
+        lines += [f"> *{answer.question}:* {re.sub(':$', '.', ' '.join(answer.words))}\n>"]
     lines += ["", *(table(tables.rivals(verdict, short=True)) if verdict.rivals else [])]
     for name in story.figures:
         if name in drawn:
-            drawn[name].savefig(FIGURES / f"diagnosis_{story.name}.png", pil_kwargs={"compress_level": 9})
+            path = FIGURES / f"diagnosis_{story.name}.png"
+            drawn[name].savefig(path)
+            path.write_bytes(small(path))
             lines += [f"![{name}](figures/diagnosis_{story.name}.png)", ""]
-    spent = sum(verdict.seconds.values())
-    return "\n".join([*lines, f"Found in {spent:.0f} s.", ""])
+    return "\n".join([*lines, ""])
 
 
 def write(sections: dict[str, str]) -> None:
@@ -103,7 +105,7 @@ def keep(logged: Logged, verdict: Verdict, folder: Path) -> None:
 
 def main() -> None:
     """Run the stories that are named, or all of them."""
-    parser = argparse.ArgumentParser(description="the seven stories of docs/diagnosis.md")
+    parser = argparse.ArgumentParser(description="the seven examples of docs/diagnosis_examples.md")
     parser.add_argument("names", nargs="*", choices=[[], *(story.name for story in STORIES)], help="stories")
     parser.add_argument("--keep", type=Path, help="folder for records and reports")
     asked = parser.parse_args()

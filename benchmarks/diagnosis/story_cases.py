@@ -81,7 +81,7 @@ STORIES = (
     Story(
         name="rudder_lag_on_fig6",
         title="3. The same rudder on the trial of Fig. 6",
-        words="One short rudder pulse cannot tell a lag from all else that delays a turn: a set is the answer,"
+        words="One short rudder pulse cannot separate a lag from other delays of a turn: a set is the answer,"
         " and the trial to fly next.",
         hidden={"rudder_lag": (0.25,)},
         expected=UNDECIDED,
@@ -91,7 +91,8 @@ STORIES = (
         name="cable_drag_or_current",
         title="4. Drag along the cable, or a current?",
         words="A straight run; the log begins at 8 s, under way, and shows the shaft's speed, too. A following current "
-        "of 0.55 m/s pays out more cable, which reads as more drag along it: speed through the water hardly tells.",
+        "of 0.55 m/s pays out more cable, which reads as more drag along it: speed through the "
+        "water hardly shows the difference.",
         trial=straight_run,
         hidden={"current": (0.49, 0.25)},
         begins=8.0,
@@ -102,7 +103,7 @@ STORIES = (
     Story(
         name="battery_sag_or_cable",
         title="5. A battery that sags, or the cable?",
-        words="Both let the speed fall slowly. A battery takes the propeller's torque along, and the roll angle tells.",
+        words="Both let the speed fall slowly. A battery takes the propeller's torque along; the roll angle shows it.",
         hidden={"battery_sag": (0.20,)},
     ),
     Story(

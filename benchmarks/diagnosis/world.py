@@ -34,10 +34,9 @@ from subzero.diagnosis.inference import Noise, Problem, pose
 from subzero.model import Model
 from subzero.records.record import Record
 
-from .cases import AFTER
 from .distance import discriminations, sensitivities
 from .draws import Values, hidden, nuisances, with_values
-from .manoeuvres import CHANNELS, ids, nominal
+from .manoeuvres import AFTER, CHANNELS, ids, nominal
 from .results import read, results_of
 from .truth import FAR, GAPS, OUTLIERS, NoRunError, agreed
 

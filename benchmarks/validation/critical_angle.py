@@ -2,7 +2,7 @@
 
     ½ρdC_n U² sin²φ = |w_c| cosφ,         −dT/ds = ½ρπdC_t U² cos²φ + |w_c| sinφ
 
-A run that starts in that state must stay there; the discrete equations have the same solution. A run that starts half
+A run that starts in that state must remain there; the discrete equations have the same solution. A run that starts half
 as fast again and slows down within 5 s must find it.
 """
 

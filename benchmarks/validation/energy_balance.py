@@ -3,7 +3,7 @@
     −F·U(0) = dE/dt + L − G + D_S + M + C,        U = V − J
 
 The balance of forces times U, integrated along the cable, is an identity; a run books both sides with the trapezoidal
-rule over its steps, and what is missing is the error of step and segment. Shown: the sum of what is missing, as a share
+rule over its steps, and the residual is the error of step and segment. Shown: the sum of residuals, as a share
 of all work and loss, after smooth manoeuvres: the dive and the helix of Table 1 with friction at the drum; a helix with
 a heavy elastic cable, a drum with inertia, and a sheared current; the umbilical on its winch.
 

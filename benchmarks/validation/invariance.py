@@ -1,11 +1,11 @@
 """Nature has no favourite direction, no clock, and no place at rest.
 
 A cable is pulled out for 10 s through a swaying manoeuvre at about 1 m/s, and again with everything turned, mirrored
-or begun 4 s later. The force on the vehicle must be the same, turned, mirrored or 4 s later. A neutral cable in still
+or started 4 s later. The force on the vehicle must be the same, turned, mirrored or 4 s later. A neutral cable in still
 water knows no direction; with weight, current, friction and inertia everything is turned about the vertical.
 
-At last everything drifts: drum, water and vehicle have the velocity (0.7, −0.4, 0.2) m/s on top, and nobody notices.
-Only the first step remembers it, for momenta are then differenced to first order; it is left out.
+At last everything drifts: drum, water and vehicle have the velocity (0.7, −0.4, 0.2) m/s on top, without effect on
+the force. Only the first step remembers it, for momenta are then differenced to first order; it is left out.
 """
 
 from __future__ import annotations
@@ -65,7 +65,9 @@ def later(wait: float = 4.0) -> Row:
     prompt = cable.pull_out(manoeuvre, 10.0)
     late = cable.pull_out(lambda t: manoeuvre(t - wait) if t > wait else np.zeros(3), 10.0 + wait)
     skipped = round(wait / 0.1)
-    return worst_vector(f"begun {wait:g} s later", late.tow_force[skipped + 1 :], prompt.tow_force[1:], 1e-6)
+    return worst_vector(
+        f"started {wait:g} s later", late.tow_force[skipped + 1 :], prompt.tow_force[1:], 1e-6
+    )
 
 
 def drifting(name: str, drum: cable.DrumProperties | cable.ConstantTension, gate: float) -> Row:

@@ -6,8 +6,8 @@ the shape and takes every force from elsewhere. So both differ, by up to six tim
 a name: the rows put the other's numbers into our table of terms, one term after another. Drag alone explains the
 speed: bare hull C_D 0.11 here, towed 0.42 there. The turn is nearly all Munk moment: full here, where the adjusted
 N_rr alone (ten times its strip integral) holds it, and absent there, with a yaw damping of one second instead. With
-all terms exchanged nothing is left beyond 5 % of what is steady. (The other's fins feel no incidence and its strips are
-21 of L/20; both are put in as numbers. Its reaction torque is divided by ten and rolls to starboard.)
+all terms exchanged nothing is left beyond 5 % of the steady value. (The other's fins feel no incidence and its strips
+are 21 of L/20; both are put in as numbers. Its reaction torque is divided by ten and rolls to starboard.)
 
 What changes quickly shows one more: the other's strips feel sway and yaw only, v + x r, ours the whole flow across,
 heave and pitch with it. So the nose falls faster there when the planes go central, and rises faster at the start. No

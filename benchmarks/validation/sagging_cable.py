@@ -7,7 +7,7 @@ node in the middle (2π); those symmetric in the plane stretch it, and obey
 
 which is a string for λ → 0 and crosses the one-node mode at λ = 2π. m1 = m + ρA moves across, and the inertia along the
 cable must not matter: w_c L/H = 0.01 here, a sag of 1/800, where the theory's own error is some 1e-5. The cable lies at
-rest on an elastic catenary, and is let go from 1e-7 L beside it: modes exchange energy already at 1e-6. Drag is off. As
+rest on an elastic catenary, and is released 1e-7 L away from it: modes exchange energy already at 1e-6. Drag is off. As
 for a string, N segments make Ω too high by (Ω/2N)²/3; that is taken out by extrapolation from 100 and 200 segments.
 """
 

@@ -5,7 +5,7 @@
 
 The wire is taut because it is towed along itself at u = 0.5 m/s, which changes nothing across (the drag across depends
 on the speed across alone, and every place of a straight wire moves alike). Once the tow point sinks at V(t), and the
-solution holds everywhere and at all times; once it stays at its depth, and the solution holds far from it until the
+solution holds everywhere and at all times; once it keeps its depth, and the solution holds far from it until the
 bend arrives: 30 m away, for 2 s. A drogue of 1e-9 m² only makes the tow start horizontally.
 """
 
@@ -48,7 +48,7 @@ def sinking(step: float, follows: bool) -> cable.History:
 def compare(step: float, follows: bool) -> list[Row]:
     """Compare the depth of the tail at all times, and its speed at the end."""
     run = sinking(step, follows)
-    name = f"{'tow point sinks too' if follows else 'tow point stays'}, {step:g} s"
+    name = f"{'tow point sinks too' if follows else 'tow point fixed'}, {step:g} s"
     depth = np.array([shape[-1, 2] for shape in run.shapes])
     exact = TERMINAL * TAU * np.log(np.cosh(run.time / TAU))
     speed = (depth[-1] - depth[-2]) / (run.time[-1] - run.time[-2])

@@ -44,7 +44,7 @@ def test_the_cable_slows_the_vehicle_and_the_energy_balance_closes(fig6):
     tethered, untethered = summary["tethered"], summary["untethered"]
     assert tethered["speed_at_end_m_s"] < tethered["peak_speed_m_s"] < untethered["peak_speed_m_s"]
     assert tethered["largest_cable_force_N"] > 0.0 == untethered["largest_cable_force_N"]
-    assert tethered["energy"]["unexplained_share"] < 1e-3  # the claim of issue 2
+    assert tethered["energy"]["unexplained_share"] < 1e-3
     assert untethered["energy"]["unexplained_share"] < 1e-3
 
 
@@ -62,7 +62,7 @@ def test_fig4_lies_on_the_exact_line_at_every_step(tmp_path):
 
     assert main(["simulate", "fig4", "--out", str(tmp_path)]) == FINE
     with xr.open_dataset(tmp_path / "tethered.nc") as run:
-        assert_allclose(run["cable_tension"].values[1:], exact_tension(run)[1:], rtol=1e-6)  # issue 2
+        assert_allclose(run["cable_tension"].values[1:], exact_tension(run)[1:], rtol=1e-6)
 
 
 def test_a_vehicle_that_cannot_be_built_is_a_mistake_not_a_bug(tmp_path, monkeypatch, capsys):

@@ -17,6 +17,15 @@ def test_every_page_is_in_the_navigation():
     assert [page.name for page in (ROOT / "docs").glob("*.md") if f": {page.name}" not in said] == []
 
 
+def test_every_picture_is_on_a_page():
+    text = "".join(
+        page.read_text(encoding="utf-8") for page in [*(ROOT / "docs").glob("*.md"), ROOT / "README.md"]
+    )
+    assert [
+        path.name for path in (ROOT / "docs" / "figures").iterdir() if f"figures/{path.name}" not in text
+    ] == []
+
+
 @pytest.mark.slow
 def test_the_site_is_built_without_a_warning(tmp_path):
     """``strict`` stands in mkdocs.yml: a warning is an error."""

@@ -1,6 +1,6 @@
 """The figures of a diagnosis show what its text and its file say: the same explanations, in the same order, as large.
 
-Verdicts are those that the benchmark keeps of challenges (`benchmarks/diagnosis/kept`), with their probabilities as
+Verdicts are those that the benchmarks keep (`benchmarks/diagnosis/kept`), with their probabilities as
 they were found; every one is told in words, written as JSON and drawn, and what is drawn is read back.
 """
 
@@ -17,6 +17,7 @@ from matplotlib.text import Text
 import subzero
 from subzero.diagnosis import (
     CAUSE_NAMED,
+    NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
     Cause,
@@ -32,15 +33,32 @@ from subzero.figures.style import BLUE, Title
 from subzero.synthetic.challenge import challenge
 
 KEPT = Path(__file__).parents[2] / "benchmarks" / "diagnosis" / "kept"
+KINDS = (CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED)
 TITLE = Title(words="a trial", scenario="fig6")
 TIME = np.linspace(0.0, 9.9, 100)
 
 
 def kept(count):
     """Return so many challenges of all kinds, evenly out of those that are kept."""
-    rows = [json.loads(line) for line in (KEPT / "seed_59.jsonl").read_text(encoding="utf-8").splitlines()]
-    rows = [row for row in rows if row.get("probabilities")]
-    return rows[:: max(1, len(rows) // count)][:count]
+    rows = [
+        json.loads(line)
+        for name in ("world_12001", "onsets_3", "outside_91")
+        for line in (KEPT / f"{name}.jsonl").read_text(encoding="utf-8").splitlines()
+    ]
+    rows = [row for row in map(as_said, rows) if row]
+    return rows[:: max(1, len(rows) // (count - 1))][-count:]
+
+
+def as_said(row):
+    """Return the verdict, the probabilities and the causes of a kept record; None where data are accused."""
+    said = row.get("probabilities") or row.get("listed")
+    if not said or row["verdict"] not in KINDS:
+        return None
+    first = max(said, key=lambda name: said[name])
+    name, _, start = first.partition("@")
+    named = row["verdict"] == CAUSE_NAMED
+    causes = [{"id": one, "start": float(start) if start else None} for one in name.split(" + ") if named]
+    return {"index": row["index"], "verdict": row["verdict"], "probabilities": said, "causes": causes}
 
 
 def verdict_of(row):
@@ -113,7 +131,7 @@ def rgb(colour):
     return tuple(int(colour[at : at + 2], 16) / 255.0 for at in (1, 3, 5))
 
 
-@pytest.mark.parametrize("row", kept(20), ids=lambda row: f"{row['kind']}_{row['index']}")
+@pytest.mark.parametrize("row", kept(20), ids=lambda row: f"{row['verdict']}_{row['index']}")
 def test_text_file_and_figure_agree(row):
     check(row)
 

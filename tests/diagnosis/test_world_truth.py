@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from benchmarks.diagnosis import manoeuvres, truth, world
-from benchmarks.diagnosis.cases import HEAVY, cases
 from subzero.diagnosis import SPECS
 from subzero.diagnosis.inference import Noise
 from subzero.synthetic.reference_run import NoTruthError
@@ -47,12 +46,6 @@ def test_there_is_no_truth_where_nothing_can_be_run(monkeypatch, none):
 
     with pytest.raises(truth.NoRunError):
         shown(monkeypatch, cannot)
-
-
-def test_heavy_drums_are_hidden_where_they_have_a_truth():
-    hidden = [case for case in cases() if HEAVY in case.causes]
-    assert hidden
-    assert all(case.manoeuvre != "rich" for case in hidden)
 
 
 @pytest.mark.parametrize(("speed", "lasting"), [(0.02, True), (7.3, False)])
