@@ -30,6 +30,7 @@ from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 
 from subzero.errors import printable
+from subzero.jit.parallel import wait_for
 from subzero.jit.signals import deliver_pending
 
 SUFFIX = ".code"
@@ -174,13 +175,11 @@ class MachineCode:
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
         """Return what was kept for a signature; None if it has to be compiled."""
-        from subzero.jit.parallel import wait_for
-
         deliver_pending()
         rtsys.initialize(target_context)  # what kept code calls
         file = self.file_for(signature, target_context.codegen())
         if file is not None:
-            wait_for(file)
+            wait_for(file, deliver_pending)
             if code := _read(file):
                 found = CompileResult._rebuild(target_context, *pickle.loads(code))
                 if found.signature.args == tuple(normalize_signature(signature)[0]):

@@ -23,8 +23,6 @@ from typing import Any
 
 import numba
 
-from subzero.jit.signals import deliver_pending
-
 Call = tuple[Callable[..., Any], tuple[Any, ...]]
 """A compiled function, and numba's types of the arguments that it will be called with."""
 
@@ -74,11 +72,11 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def wait_for(file: Path) -> None:
-    """Wait for a file that the second process makes, as long as it works."""
+def wait_for(file: Path, meanwhile: Callable[[], None]) -> None:
+    """Wait for a file that the second process makes, as long as it works; `meanwhile` is called again and again."""
     while file in _awaited and not file.exists() and _process[0].poll() is None:
         time.sleep(POLL_S)
-        deliver_pending()
+        meanwhile()
 
 
 def serve() -> None:
