@@ -41,8 +41,10 @@ def merged(records: Sequence[Record]) -> Record:
         shift = 0.0
         if record is not first:
             shift, error, shared = offset(first, record)
-            notes.append(f"{record.source}: its clock is {shift:+.4g} ± {2.0 * error:.2g} s (95 %) from that of "
-                         f"{first.source}, by {', '.join(shared)}.")  # fmt: skip
+            notes.append(
+                f"{record.source}: its clock is {shift:+.4g} ± {2.0 * error:.2g} s (95 %) from that of "
+                f"{first.source}, by {', '.join(shared)}."
+            )
         new = [name for name in record.values if name not in taken]
         samples += [sample for name in new for sample in _samples(record, name, shift)]
         taken.update(new)

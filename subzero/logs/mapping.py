@@ -132,8 +132,14 @@ def _are_fractions(table: Table, name: str, other: str) -> bool:
     ]
     named = recognised(other)
     is_whole = all(values.size and np.all(values == np.round(values)) for values in both)
-    return bool(is_whole and named and named.unit in ("us", "ns") and both[1].max() < 1e9 and np.ptp(both[1]) > 0.0
-                and (np.diff(both[0]) == 0.0).any())  # fmt: skip
+    return bool(
+        is_whole
+        and named
+        and named.unit in ("us", "ns")
+        and both[1].max() < 1e9
+        and np.ptp(both[1]) > 0.0
+        and (np.diff(both[0]) == 0.0).any()
+    )
 
 
 def _clock_of_numbers(name: str, values: np.ndarray, written: str) -> tuple[Clock, tuple[str, ...]]:
@@ -162,10 +168,14 @@ def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> 
     named = {
         name: found
         for name, column in table.columns.items()
-        if column.form == NUMBER and (found := recognised(name, column.unit)) and found.channel != TIME.name
+        if column.form == NUMBER
+        and (found := recognised(name, column.unit))
+        and found.channel != TIME.name
         and np.isfinite(column.values[rows]).any()
-        and (found.channel not in (LATITUDE, LONGITUDE) or np.nan_to_num(column.values[rows]).any())  # 0: no fix
-    }  # fmt: skip
+        and (
+            found.channel not in (LATITUDE, LONGITUDE) or np.nan_to_num(column.values[rows]).any()
+        )  # 0: no fix
+    }
     if "surge_speed" not in {found.channel for found in named.values()}:  # v may be the speed itself
         named = {name: found for name, found in named.items() if found.channel not in ACROSS}
     values = {name: table.columns[name].values[rows] for name in named}
@@ -176,8 +186,11 @@ def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> 
     columns = {use.channel: Measured(use.channel, values[name], use.unit) for name, use in used.items()}
     said = findings({**_positions(columns), **columns}, time)
     lines = {name: _unused(table, name, chosen) for name in table.columns if name not in clock.columns}
-    lines |= {name: Line(name=name, channel=named[name].channel, unit=named[name].unit or ASKED, reason=RIVAL)
-              for name, reason in chosen.items() if reason == RIVAL}  # fmt: skip
+    lines |= {
+        name: Line(name=name, channel=named[name].channel, unit=named[name].unit or ASKED, reason=RIVAL)
+        for name, reason in chosen.items()
+        if reason == RIVAL
+    }
     lines |= {name: _line(name, found, said, chosen[name]) for name, found in used.items()}
     questions += [_question(lines[name], said) for name in used if lines[name].unit == ASKED]
     names = {found.channel: lines[name] for name, found in used.items()}

@@ -1,4 +1,4 @@
-"""A verdict as ``diagnosis.json``: plain numbers and texts, NaN as null; docs/diagnosis.md explains every key."""
+"""A verdict as ``diagnosis.json``: plain numbers and texts, NaN as null; docs/diagnosis_files.md explains every key."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ HEADLINES = {
     NOTHING_NEAR: "Nothing comes near these records",
     CAUSE_NAMED: "The cause is named",
     UNDECIDED: "Undecided: several causes explain the records as well",
-    OUTSIDE: "Something real, and outside the catalogue",
+    OUTSIDE: "Something real that is not in the catalogue",
     DATA_ERROR: "An error in the data",
 }
 
