@@ -15,6 +15,7 @@ import os
 import pickle
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
@@ -34,6 +35,7 @@ from subzero.jit.parallel import wait_for
 from subzero.jit.signals import deliver_pending
 
 SUFFIX = ".code"
+UNUSED_S = 30 * 86400.0
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("cable", "vehicle", "scenarios", "subzero")
 CORE = (
@@ -89,13 +91,31 @@ def folder_of(digest: str) -> Path | None:
         return None
     folder = base / f"code-{digest}"
     try:
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        if not folder.is_dir():
+            folder.mkdir(parents=True, mode=0o700, exist_ok=True)
+            _remove_unused(base)
         if all(map(_is_private, (base, folder))):
+            with suppress(OSError):  # a folder that may be read only
+                os.utime(folder)
             return folder
         _warn(f"others may write to {printable(str(folder))}, or own it")
     except OSError as error:
         _warn(f"{printable(str(base))}: {error.strerror}")
     return None
+
+
+def _remove_unused(base: Path) -> None:
+    """Remove compiled code that no process has used for a month: files of this module, and folders that are empty then."""
+    for folder in base.glob("code-" + "[0-9a-f]" * 12):
+        with suppress(OSError):
+            if (
+                time.time() - folder.stat().st_mtime > UNUSED_S
+                and not folder.is_symlink()
+                and _is_private(folder)
+            ):
+                for file in folder.glob(f"*{SUFFIX}"):
+                    file.unlink()
+                folder.rmdir()
 
 
 def base_folder() -> Path | None:

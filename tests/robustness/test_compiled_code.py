@@ -17,6 +17,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 import numba
@@ -133,6 +134,22 @@ def test_code_of_another_function_is_damaged_code(run, kept):
     run()
     moved = kept().rename(kept().with_name("another.code"))
     assert machine_code._read(moved) is None
+
+
+def test_code_that_was_not_used_for_a_month_is_removed_and_nothing_else(run, base):
+    month_ago = time.time() - 31 * 86400.0
+    old = [base / name for name in ("code-0123456789ab", "code-0123456789ac", "code-mine", "thesis")]
+    for folder in old:
+        folder.mkdir(parents=True, mode=0o700)
+        (folder / "f-0.code").write_bytes(b"")
+    (old[1] / "notes.txt").write_text("mine")
+    (base / "code-0123456789ad").symlink_to(old[3])
+    for folder in old:
+        os.utime(folder, (month_ago, month_ago))
+    run()
+    assert not old[0].exists()
+    assert (old[1] / "notes.txt").exists()
+    assert all((folder / "f-0.code").exists() for folder in old[2:])
 
 
 @pytest.mark.parametrize("place", ["a file", "in a file", "nowhere", "no home"])
