@@ -105,7 +105,7 @@ def folder_of(digest: str) -> Path | None:
 
 
 def _remove_unused(base: Path) -> None:
-    """Remove compiled code that no process has used for a month: files of this module, and folders that are empty then."""
+    """Remove code that no process has used for a month: files of this module, and folders that are empty then."""
     for folder in base.glob("code-" + "[0-9a-f]" * 12):
         with suppress(OSError):
             if (
