@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -32,6 +33,7 @@ def import_(
     out: Path = Path("record.csv"),
     map_out: Path | None = None,
     merge: Annotated[bool, Parameter(negative=())] = False,
+    trial: Path | None = None,
     output_mode: OutputMode = PLAIN,
 ) -> int:
     """Make records of logs as their loggers wrote them: names, units and times found, and every change said.
@@ -42,12 +44,15 @@ def import_(
         out: the record; its map goes there too, as NAME.map.toml. With several logs a folder, for one record of each.
         map_out: write the map to this file, and no record: to edit it, and give it again with --map.
         merge: the logs are of one trial: align their clocks by the channels that they share, and make one record.
+        trial: write a trial, too, that begins where the record begins, lasts as long, and has its commands.
         output_mode: how the command speaks.
     """
     from subzero.logs.align import merged
     from subzero.logs.api import import_log, undecided
 
     targets = _targets(logs, out, map_out, merge)
+    if trial is not None and (map_out is not None or (len(logs) > 1 and not merge)):
+        raise UserError("--trial goes with one record. Give one log, or --merge; and leave out --map-out.")
     with contextlib.ExitStack() as stack:
         found = [import_log(log, map, _progress_of(log, stack)) for log in logs]
     open_ones = [log for log in found if log.record is None]
@@ -58,11 +63,23 @@ def import_(
         found = [replace(found[0], record=merged(records)), *(replace(log, record=None) for log in found[1:])]
     folder = map_out.parent if map_out is not None else targets[0].parent
     written = _written(found, targets, folder, map_out)
+    if trial is not None:
+        _write_trial(trial, found[0], targets[0])
+        written["files"] = [*written["files"], printable(os.path.relpath(trial, folder))]
     with output_mode.emit({**written, "logs": [_as_json(log) for log in found]}):
         for log in found:
             _print(log)
         print(f"Wrote {', '.join(printable(str(folder / name)) for name in written['files'])}")
     return FINE
+
+
+def _write_trial(path: Path, found: Imported, record: Path) -> None:
+    """Make the trial of a record that was written."""
+    from subzero.files.read_file import make_toml
+    from subzero.logs.trial_file import trial_of
+
+    assert found.record is not None
+    make_toml(path, trial_of(found.record, Path(os.path.relpath(record, path.parent)).as_posix()))
 
 
 def _progress_of(log: Path, stack: contextlib.ExitStack) -> Callable[[float], None]:

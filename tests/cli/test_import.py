@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 import math
 import tomllib
+from pathlib import Path
 
+import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+import subzero
 from subzero.cli.app import FINE, MISTAKE, main
 from subzero.records.record import read_record
 
@@ -182,3 +185,33 @@ def test_two_logs_of_one_trial_are_merged_on_one_clock_or_nothing_is_written(her
     assert main(["import", "a.csv", "log.csv", "--merge", "--out", "c.csv"]) == MISTAKE
     assert "cannot be aligned: they share no channel" in capsys.readouterr().err
     assert not (here / "c.csv").exists()
+
+
+def test_a_trial_begins_where_the_record_begins_and_lasts_as_long(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    rows = "\n".join(f"{0.5 * k},{340.0 + k},{2.0 + 0.01 * k},{0.4}" for k in range(41))
+    Path("log.csv").write_text(f"time_s,heading_deg,depth_m,surge_speed_m_s\n{rows}\n")
+    assert main(["import", "log.csv", "--out", "flown.csv", "--trial", "flown.toml"]) == 0
+    trial = subzero.load_scenario("flown.toml")
+    assert trial.duration == 20.0
+    start = trial.start
+    assert (np.degrees(start.heading), start.depth) == pytest.approx((340.0, 2.0))
+    assert not trial.commands.values.any()
+    assert "flown.toml" in capsys.readouterr().out
+    assert main(["import", "log.csv", "--out", "flown.csv", "--trial", "flown.toml"]) == 2
+
+
+def test_a_trial_takes_the_commands_of_a_record(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names = [
+        "propeller_command_rps",
+        "rudder_command_deg",
+        "stern_plane_port_command_deg",
+        "stern_plane_starboard_command_deg",
+    ]
+    rows = "\n".join(f"{0.5 * k},{10.0 + 0.1 * k},20,{0.1 * k},0,0" for k in range(21))
+    Path("log.csv").write_text(",".join(["time_s", "heading_deg", *names]) + f"\n{rows}\n")
+    assert main(["import", "log.csv", "--out", "flown.csv", "--trial", "flown.toml"]) == 0
+    trial = subzero.load_scenario("flown.toml")
+    assert trial.commands.values[0][0] == 20.0
+    assert np.degrees(trial.commands.values[-1][1]) == pytest.approx(2.0)

@@ -33,9 +33,8 @@ def test_every_command_of_the_page_is_understood():
         shlex.split(line) for block in BLOCKS for line in block.splitlines() if line.startswith("subzero ")
     ]
     assert [words[1] for words in commands] == [
-        "new",
-        "validate",
         "import",
+        "validate",
         "compare",
         "calibrate",
         "diagnose",
