@@ -147,7 +147,7 @@ def _own(problem: Problem, r: np.ndarray, record: int, channel: str) -> np.ndarr
 def still_channels_of(
     whole: Suspects, errors: Sequence[SuspectedError], records: Sequence[Logged]
 ) -> tuple[StillChannel, ...]:
-    """Return the rounded channels that are held to stand still where only some suspected errors are corrected."""
+    """Return the rounded channels that are assumed to stand still where only some suspected errors are corrected."""
     return tuple(
         StillChannel(error.record, error.error.channels[0], lost_by(error, errors, records))
         for error in whole.errors
@@ -437,8 +437,8 @@ def _posed_like(search: Search, records: Sequence[Logged], errors: Errors, kept:
 def _similar(
     old: Observed, new: Observed, kept: Mapping[str, np.ndarray], where: Mapping[str, np.ndarray]
 ) -> Observed:
-    """Return a record with the noise and the step errors of another; restricted to some of the written samples, whose
-    places in it are `where` (n,).
+    """Return a record with the noise and the step errors of another; restricted to some of the written samples;
+    `where` has the written sample at each place in it (n,).
     """
     noise = {}
     for name, each in old.noise.items():

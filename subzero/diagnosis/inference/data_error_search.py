@@ -209,8 +209,8 @@ def _total_lead(found: Sequence[_Judged]) -> float:
 def _by_clock_of_others(
     started: SaturatedModel, read_off: Sequence[DataError], found: list[_Judged], trusted: frozenset[str]
 ) -> list[_Judged]:
-    """Return errors, or what comes out better with the clock of a channel that seems to be late besides: if most
-    channels say little, the one that is early by itself has set the clock of all.
+    """Return errors, or those found with the clock of a channel that also seems to be late, if they are more
+    probable: if most channels are uninformative, the one that is early by itself has set the clock of all.
     """
     clocks = [suspect.suspect.error for suspect in found if suspect.suspect.error.kind == "late_clock"]
     later = [suspect.suspect.error.amount for suspect in found if suspect.suspect.error.kind == "latency"]

@@ -226,11 +226,11 @@ def estimate_force(
 
     Args:
         problem: records and parameters.
-        fit: to begin with: of "nothing is wrong" within wide tolerances, or of named causes.
+        fit: the start: of "nothing is wrong" within wide tolerances, or of named causes.
         axis: X, Y, Z, K, M or N.
         D: prior variances of the problem's entries (k,); those of the fit if None.
         spacing: of the knots. [s]
-        most_fresh: how many times sensitivities may be made again on the way.
+        most_fresh: how many times sensitivities may be computed again on the way.
     """
     D = fit.D if D is None else D
     knots = knots_of(problem, spacing)
@@ -370,8 +370,8 @@ def linear_candidates(
 ) -> list[tuple[float, LatentForceCandidate]]:
     """Return the log posteriors of forces without causes in the linear problem around a fit, and the forces.
 
-    Only κ up to the fit's own are used: a fit is a poor linearisation point for wider tolerances, with which the
-    model would rather deviate from its priors.
+    A fit is a poor linearisation point for tolerances wider than its own: with those the model would rather deviate
+    from its priors.
     """
     D = {kappa: variances(problem.entries, (), kappa) for kappa in kappas}
     log = {

@@ -67,7 +67,7 @@ class Linear(NamedTuple):
 
     @property
     def quadratic(self) -> Quadratic:
-        """The same as products, of the size of the parameters."""
+        """The same as products with Jᵀ, whose size is that of the parameters."""
         whole, J = self
         return Quadratic(A=J.T @ J, b=J.T @ whole, rr=float(whole @ whole))
 
@@ -232,7 +232,7 @@ class ProcessShape(NamedTuple):
 def seen(
     A: np.ndarray, b: np.ndarray, D: np.ndarray, J: np.ndarray, columns: np.ndarray, r: np.ndarray
 ) -> ForceInformation:
-    """Return what the data say of columns, all other entries free under D.
+    """Return the information of the data on columns, all other entries marginalised under D.
 
     Args:
         A: JᵀJ (k, k).
