@@ -208,7 +208,7 @@ def _around_themselves(
     terms: Mapping[str, Terms],
 ) -> list[RelinearisedForce]:
     """Return the most probable forces and drifts without causes, linearised at fits of their own, if they may become
-    the best; none where "nothing is wrong" explains the records within declared tolerances.
+    the best; none where "nothing is wrong" within declared tolerances is the best hypothesis.
     """
     problem, best, prior = search.problem, search.best(), _log_prior(search.problem)
     if not best.ids and best.kappa == min(KAPPAS):

@@ -160,13 +160,14 @@ def _used(values: np.ndarray, difference: np.ndarray, usual: SensorPrior) -> np.
 def with_residual_noise(
     problem: Problem, z: np.ndarray, D: np.ndarray, white: np.ndarray | None = None
 ) -> Problem | None:
-    """Return the problem with the noise that is left behind deviations z; None if that is as good as known.
+    """Return the problem with the noise estimated from the residual at deviations z; None if it hardly differs from
+    the present one.
 
     Args:
         problem: records and parameters.
         z: the best fit so far (k,).
         D: prior variances of the parameters in it (k,).
-        white: sensitivities of the problem close to z (m, k); if they are known, outliers are, too.
+        white: whitened sensitivities of the problem close to z (m, k); if given, the outliers are left as they are.
     """
     records = tuple(
         _without_outliers(problem, i, z) if white is None else each for i, each in enumerate(problem.records)
