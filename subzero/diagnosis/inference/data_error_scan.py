@@ -350,8 +350,8 @@ def possible(saturated: SaturatedModel, trusted: frozenset[str]) -> list[Group]:
 def _is_quiet(saturated: SaturatedModel, error: DataError) -> bool:
     """Say whether a channel's noise from sample to sample is that of a sensor, once it is in the right unit.
 
-    Where the prediction fails, any unit that makes the values smaller would be as likely; the noise tells units
-    apart.
+    Where the prediction fails, any unit that makes the values smaller would be as likely; the noise differs between
+    units.
     """
     (name,) = error.channels
     record = error.corrected(saturated.logged).record

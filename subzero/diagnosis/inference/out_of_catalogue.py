@@ -400,12 +400,13 @@ def _against_nothing(
 def _against_noise(
     candidate: OutOfCatalogue, what: LatentForceCandidate, log: float, behind: Problem
 ) -> OutOfCatalogue:
-    """Return a force or a drift with the noise behind nothing, or with that beside all that it might do: behind nothing
-    it is noise, and beside that noise there is little left of it; the two have an optimum each.
+    """Return a force or a drift with the noise of "nothing is wrong", or with the noise given everything that the
+    force might do: in the residual of "nothing is wrong" the force is noise, and given that noise little of the force
+    is left; so there are two optima.
 
     Args:
         candidate: as it is.
-        what: it is, white by the noise behind nothing.
+        what: its force or drift, whitened with the noise of "nothing is wrong".
         log: what is added to its log evidence then.
         behind: the problem with that noise.
     """

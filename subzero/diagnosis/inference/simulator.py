@@ -338,7 +338,8 @@ def respond(setting: Setting, times: np.ndarray, channels: Iterable[str]) -> dic
         channels: names of `subzero.channels`, of those in `TRUTHS`.
 
     Returns:
-        channel → values (n,) in its display unit; NaN from where the simulation failed. After its end the last values hold.
+        channel → values (n,) in its display unit; NaN from where the simulation failed. The last values hold after
+            its end.
     """
     return read(setting, simulate_track(setting), times, channels)
 

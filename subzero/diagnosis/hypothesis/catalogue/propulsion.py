@@ -6,7 +6,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter, growing
 
 CHARGE = 60.0
-"""What 2 A draw from the battery in 30 s: sag is told for this much. [C]"""
+"""Charge that 2 A draw from the battery in 30 s: sag is stated for this charge. [C]"""
 
 
 def propeller_thrust_gain(setting: Setting, share: float) -> Setting:
