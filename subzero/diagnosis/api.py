@@ -451,7 +451,7 @@ def _with_errors(
         name: replace(own, recorded=_recorded(records, explanation.errors, name))
         for name, own in after.curves.items()
     }
-    listed = {_beside(explanation.errors, name): share * p for name, p in after.probabilities.items()}
+    listed = {_name_with_errors(explanation.errors, name): share * p for name, p in after.probabilities.items()}
     words = " ".join(f"{error.record}: {error.sentence}: {error.remedy}." for error in errors)
     return replace(
         after,
@@ -490,7 +490,7 @@ def _with_possible(
     further = [error for error in more.errors if (error.record, error.error.id) not in known]
     errors = _reported(records, further, probability)
     listed = {name: (1.0 - probability) * p for name, p in reported.probabilities.items()}
-    listed[_beside(more.errors, "none")] = probability
+    listed[_name_with_errors(more.errors, "none")] = probability
     words = " and ".join(error.sentence for error in errors)
     rival = Rival(
         ids=tuple(error.id for error in errors),
@@ -498,10 +498,10 @@ def _with_possible(
         probability=probability,
         discrimination=np.nan,
     )
-    drawn = _with_planted(reported.curves, records, more, further, f"rival: {_beside(more.errors, 'none')}")
+    drawn = _with_planted(reported.curves, records, more, further, f"rival: {_name_with_errors(more.errors, 'none')}")
     rivals = tuple(sorted([*reported.rivals, rival], key=lambda each: -each.probability))
     ranked = dict(sorted(listed.items(), key=lambda pair: -pair[1]))
-    beside = replace(
+    with_rival = replace(
         reported,
         rivals=rivals,
         curves=drawn,
@@ -510,8 +510,8 @@ def _with_possible(
         data_errors=reported.data_errors or errors,
     )
     if probability <= 1.0 - NAMED_PROBABILITY or reported.on_model == NOTHING_NEAR:
-        return beside
-    return replace(beside, then=UNDECIDED) if reported.then else replace(beside, verdict=UNDECIDED)
+        return with_rival
+    return replace(with_rival, then=UNDECIDED) if reported.then else replace(with_rival, verdict=UNDECIDED)
 
 
 def _with_planted(
@@ -536,7 +536,7 @@ def _with_planted(
     return found
 
 
-def _beside(found: Sequence[SuspectedError], name: str) -> str:
+def _name_with_errors(found: Sequence[SuspectedError], name: str) -> str:
     """Return the name of an explanation with errors in the data added to it."""
     ids = dict.fromkeys(trial.error.id for trial in found)
     return " + ".join([*ids, *([] if name == "none" else [name])])

@@ -1,4 +1,4 @@
-"""Keep compiled code for the next run: never of other sources, never damaged, never writable by anybody else.
+"""Keep compiled code for the next run: never of other sources, never damaged, never writable by another user.
 
 The code of one function for one kind of arguments is a file. Its folder is named by a digest of all sources that
 compiled code may be made of (`sources_of`), of the compiler's version and of its settings; whatever changes starts a
@@ -50,20 +50,20 @@ CORE = (
 _announcements: list[Callable[[], None]] = []
 _warned: set[str] = set()
 counting = [False]
-"""Whether a line with the number of compiled functions stands open on standard error."""
+"""Whether a line with the number of compiled functions is unfinished on standard error."""
 _compiled = [0]
 
 
 @cache
 def sources_of(room: str, file: Path | None = None) -> tuple[Path, ...]:
-    """Return the files that the compiled code of a room (``cable``, ``subzero/diagnosis``) may be made of.
+    """Return the files that the compiled code of a package (``cable``, ``subzero/diagnosis``) may depend on.
 
-    A function frozen into machine code has frozen with it other functions and constants of the modules that it
-    imports. By the import contracts these stand in the function's own room or in those of the core.
+    The machine code of a function includes other functions and constants of the modules that it imports. By the
+    import contracts these are in the function's own package or in the core.
 
     Args:
-        room: folder of the function, from the folder of the packages.
-        file: of a function that stands elsewhere; it counts alone with the core.
+        room: folder of the function's package, relative to the root.
+        file: of a function in no package of the product; only this file and the core count.
     """
     folders = {*CORE, room} if file is None else set(CORE)
     inside = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
@@ -82,7 +82,7 @@ def digest_of(room: str, file: Path | None = None) -> str:
 
 @cache
 def folder_of(digest: str) -> Path | None:
-    """Return the folder for code, which is made if need be; None if nothing can be kept, which is said once."""
+    """Return the folder for code, which is created if necessary; None, with one warning, if nothing can be kept."""
     base = base_folder()
     if base is None:
         _warn("this user has no home folder")
@@ -99,7 +99,7 @@ def folder_of(digest: str) -> Path | None:
 
 
 def base_folder() -> Path | None:
-    """Return the folder that all compiled code is kept in; None if this user has no home."""
+    """Return the folder of all compiled code; None if this user has no home."""
     if chosen := os.environ.get("SUBZERO_CACHE_DIR"):
         return Path(chosen).absolute()
     if os.path.isabs(general := os.environ.get("XDG_CACHE_HOME", "")):
@@ -111,7 +111,7 @@ def base_folder() -> Path | None:
 
 
 def _is_private(folder: Path) -> bool:
-    """Say whether only this user, or root, can have put code there: it is run as it is."""
+    """Say whether only this user, or root, can have written code there: it is executed without further checks."""
     about = folder.stat()
     if not hasattr(os, "geteuid"):  # Windows: a home folder has access rules of its own
         return True
@@ -119,7 +119,7 @@ def _is_private(folder: Path) -> bool:
 
 
 def _compiler() -> tuple[Any, ...]:
-    """Return what compiled code depends on besides its sources and the processor."""
+    """Return the dependencies of compiled code other than its sources and the processor."""
     no_matter = ("CACHE", "THREAD", "COLOR", "GDB", "CUDA")
     settings = {
         name: value
@@ -130,11 +130,11 @@ def _compiler() -> tuple[Any, ...]:
 
 
 def _warn(why: str) -> None:
-    """Say on standard error, once, that compiled code cannot be kept."""
+    """Warn on standard error, once, that compiled code cannot be kept."""
     if "kept" not in _warned:
         _warned.add("kept")
         line = f"Compiled code is not kept: {why}. Give a folder of your own with SUBZERO_CACHE_DIR."
-        with suppress(OSError, ValueError):  # nothing reads it any more
+        with suppress(OSError, ValueError):  # standard error may be closed
             print(
                 "\n" * counting[0] + line + " This run compiles what it needs (up to a minute).",
                 file=sys.stderr,
@@ -142,7 +142,7 @@ def _warn(why: str) -> None:
 
 
 class MachineCode:
-    """What numba asks for the compiled code of a function, and gives it to: the interface of its own cache.
+    """The kept code of a function, with the interface of numba's own cache.
 
     Args:
         function: as it is written in Python.
@@ -174,9 +174,9 @@ class MachineCode:
         return folder / f"{function.__name__[:80]}-{digest[:24]}{SUFFIX}"
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """Return what was kept for a signature; None if it has to be compiled."""
+        """Return the kept code for a signature; None if it has to be compiled."""
         deliver_pending()
-        rtsys.initialize(target_context)  # what kept code calls
+        rtsys.initialize(target_context)  # the runtime that kept code calls
         file = self.file_for(signature, target_context.codegen())
         if file is not None:
             wait_for(file, deliver_pending)
@@ -189,7 +189,7 @@ class MachineCode:
         return None
 
     def save_overload(self, signature: Any, data: Any) -> None:
-        """Keep what was compiled for a signature; not what holds addresses of this process."""
+        """Keep the compiled code for a signature; not code that contains addresses of this process."""
         _compiled[0] += 1
         file = self.file_for(signature, data.codegen)
         if (
@@ -201,7 +201,7 @@ class MachineCode:
             _write(file, dumps(data._reduce()))
 
     def enable(self) -> None:
-        """Do nothing: it is always so."""
+        """Do nothing: the cache is always enabled."""
 
     disable = flush = enable
 
@@ -217,7 +217,7 @@ def _read(file: Path) -> bytes | None:
 
 
 def _write(file: Path, code: bytes) -> None:
-    """Let a file appear with this code in it, whole."""
+    """Write a file with this code atomically."""
     try:
         handle, unfinished = tempfile.mkstemp(dir=file.parent)
         try:
@@ -238,6 +238,6 @@ def compiled_functions() -> int:
 
 
 def before_compiling(announce: Callable[[], None]) -> None:
-    """Have something said, once, when something has to be compiled."""
+    """Register a function that is called once, before the first compilation."""
     if not _compiled[0]:
         _announcements[:] = [announce]

@@ -3,7 +3,7 @@
     G = information of two causes with all other tolerances free
     signal² = sᵀ G_aa s,    D(a|b) = sᵀ (G_aa − G_ab (G_bb + 1/s_b²)⁻¹ G_ba) s,    D = min over b
 
-D is twice the expected log evidence by which the data prefer a to b: below 9 they cannot be told apart, from 16 on
+D is twice the expected log evidence by which the data prefer a to b: below 9 they cannot be distinguished, from 16 on
 they can. A cause of another size v has (v/s)² times as much.
 """
 

@@ -63,7 +63,7 @@ class Setting:
         trial: commands, start, steps.
         model: vehicle, cable, drum, water.
         sensing: channel → error of its sensor; channels without an entry have none.
-        clock_offset: the sensors' clock is late by this: what is logged at t happened at t − offset. [s]
+        clock_offset: the sensors' clock is late by this: a sample logged at t was taken at t − offset. [s]
         intervals: channel → time between two measurements, where a logger filled in the samples between them. [s]
         sampled: such a measurement was taken later than its time by this share of its interval: ½ if it is the mean
             over the interval that begins there, −½ over the one that ends there. [-]

@@ -1,14 +1,15 @@
-"""The most probable noise of a channel behind a fit z*, Jacobian J (REML).
+"""The most probable noise of a channel, from the residual of a fit z* with Jacobian J (REML).
 
     y − h(z*) + J z*  ~  N(0, J D Jᵀ + Σ(σ_w, σ_s, τ_s, q)),        z ~ N(0, D),      Σ and priors as in `noise`
 
-What the parameters can do is marginalised, so that a smooth misfit that the model can follow is no noise. A slow part
-has a prior: a usual sensor wanders by about its usual noise, and a wander many times as large is something to find, so
-σ_s stays below `MOST_SLOW`.
+The parameters are marginalised, so that a smooth misfit that the model can follow is no noise. The slow part has a
+prior: a usual sensor wanders by about its usual noise, and a wander many times as large is an effect to be found, so
+σ_s is bounded by `MOST_SLOW`.
 
-The best of a grid are made better by Nelder's and Mead's method (1965), in compiled code: a simplex of four points
-whose worst corner is reflected about the centre of the others, farther where that is best of all, less far or towards
-them where it is not even better than the worst but one; if that does not help, all are drawn to the best.
+The best points of a grid are refined by Nelder's and Mead's method (1965), in compiled code: in a simplex of four
+points the worst corner is reflected about the centre of the others; expanded if that is the best of all; contracted,
+to the outside or the inside, if it is not better than the second worst; if that does not help either, all corners
+shrink towards the best.
 """
 
 from __future__ import annotations
@@ -31,31 +32,33 @@ from subzero.diagnosis.hypothesis.noise import (
 from subzero.jit import compiled, scratch
 
 LEAST_SLOW, MOST_SLOW = 0.05, 4.0
-"""A slow part of more usual sizes than the last is no noise of the sensor; of less than the first is no sensor, and the
-steps of a simulation err by as much. [-]"""
+"""Bounds of the slow part, in usual sizes: a larger one is no noise of the sensor; no sensor has a smaller one, and
+the steps of a simulation err by as much. [-]
+"""
 SHORTEST, LONGEST = 0.25, 1.0 / 3.0
 """Correlation times lie between this share of a sample and that of the record. [-]"""
 FELT = 0.03
-"""A direction of the parameters that moves the samples by less than this, in usual levels, is left out. [-]"""
+"""A direction of the parameters that moves the samples by less than this, in usual levels, is neglected. [-]"""
 MOST_WHITE, SEEN_WHITE = 3.0, 1.5
-"""σ_w is at most so many usual levels, or so many times what second differences of the samples show. [-]"""
+"""σ_w is at most so many usual levels, or so many times the estimate from second differences of the residual. [-]"""
 RATIOS, TIMES, LEVELS = (0.1, 0.5, 1.0, 3.0), 6, (0.4, 1.0, 2.5)
-"""Where the search for the best begins: σ_s/σ_w, how many τ_s, and level in the level of what is left. [-]"""
+"""Grid of starts: σ_s/σ_w, number of τ_s, and level over that of the residual. [-]"""
 BEGUN = 2
-"""So many of them, the best, are made better."""
+"""Number of starts, the best ones, that are refined."""
 FIRST_MOVE, FIRST_MOVE_OF_0 = 0.05, 0.00025
-"""The other corners of the first simplex have one number that is larger by this share; or so large if it is 0. [-]"""
+"""In each other corner of the first simplex one number is larger by this share; or has this size if it is 0. [-]"""
 SETTLED, MOST_ASKED = 0.02, 200
-"""It ends where all corners lie as close to the best, in each logarithm and in nats; or when the likelihood was asked
-for so often."""
+"""The search ends when all corners are within this distance of the best, in each logarithm and in nats; or after so
+many evaluations of the likelihood.
+"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ResidualNoise:
-    """What a fit leaves of a channel, for its noise to be found in.
+    """The residual of a channel in a fit, from which its noise is estimated.
 
     Attributes:
-        residual: y − h(z*) + J z* (m,): what is left if the parameters did nothing.
+        residual: y − h(z*) + J z* (m,): that with all parameters at 0.
         J: sensitivities to the parameters (m, k), in the channel's unit.
         D: prior variances of the parameters (k,).
     """
@@ -66,7 +69,7 @@ class ResidualNoise:
 
 
 class NoiseSearch(NamedTuple):
-    """What the most probable noise is sought in.
+    """The data of the search for the most probable noise.
 
     Attributes:
         steps: times to the next sample (m,). [s]
@@ -74,7 +77,7 @@ class NoiseSearch(NamedTuple):
         rounding: q²/12.
         prior: of log σ_w, log σ_s, log τ_s.
         low, high: their bounds (3,).
-        room: to work in (n + 3, n + 1).
+        room: work space (n + 3, n + 1).
     """
 
     steps: np.ndarray
@@ -94,7 +97,7 @@ def estimate(
     Args:
         time: of the samples that are used (m,). [s]
         behind: what the fit leaves.
-        usual: of the sensor's kind.
+        usual: the prior of the sensor.
         known: as it was found behind something else; the search begins there, too.
 
     Returns:
@@ -132,7 +135,7 @@ def costs_of(sought: NoiseSearch, points: np.ndarray, costs: np.ndarray) -> None
 
 @compiled
 def _cost(sought: NoiseSearch, log: np.ndarray) -> float:
-    """Return minus the log density of log σ_w, log σ_s, log τ_s (3,), but for a constant."""
+    """Return minus the log density of log σ_w, log σ_s, log τ_s (3,), up to a constant."""
     white, slow, lasts = np.exp(log[0]), np.exp(log[1]), np.exp(log[2])
     unrelated = white * white + sought.rounding
     likelihood = log_marginal(sought.steps, unrelated, slow * slow, lasts, sought.both, sought.room)
@@ -141,7 +144,7 @@ def _cost(sought: NoiseSearch, log: np.ndarray) -> float:
 
 @compiled
 def descend(sought: NoiseSearch, point: np.ndarray) -> float:
-    """Overwrite a point (3,) with the best one down from it, and return the cost of that."""
+    """Overwrite a point (3,) with the minimum found from it, and return its cost."""
     simplex, costs = scratch(4, 3), scratch(1, 4)[0]
     for k in range(4):
         _corner(sought, point, k - 1, simplex[k])
@@ -158,7 +161,8 @@ def descend(sought: NoiseSearch, point: np.ndarray) -> float:
 
 @compiled
 def _corner(sought: NoiseSearch, point: np.ndarray, moved: int, corner: np.ndarray) -> None:
-    """Fill a corner of the first simplex (3,): the point with one of its numbers moved, back from a bound."""
+    """Fill a corner of the first simplex (3,): the point with one of its numbers moved, reflected at an upper bound.
+    """
     for i in range(3):
         corner[i] = point[i]
         if i == moved:
@@ -170,14 +174,14 @@ def _corner(sought: NoiseSearch, point: np.ndarray, moved: int, corner: np.ndarr
 
 @compiled
 def _clip(sought: NoiseSearch, point: np.ndarray) -> None:
-    """Put a point (3,) between the bounds."""
+    """Clip a point (3,) to the bounds."""
     for i in range(3):
         point[i] = min(max(point[i], sought.low[i]), sought.high[i])
 
 
 @compiled
 def _sort(simplex: np.ndarray, costs: np.ndarray) -> None:
-    """Put the corners into the order of their costs, the best first."""
+    """Sort the corners by their costs, the best first."""
     for k in range(1, 4):
         for at in range(k, 0, -1):
             if not costs[at] < costs[at - 1]:
@@ -199,8 +203,7 @@ def _is_settled(simplex: np.ndarray, costs: np.ndarray) -> bool:
 
 @compiled
 def _improve(sought: NoiseSearch, simplex: np.ndarray, costs: np.ndarray) -> int:
-    """Put a better point in the place of the worst corner, or draw all to the best; return how often costs were
-    asked for.
+    """Replace the worst corner by a better point, or shrink all towards the best; return the number of evaluations.
     """
     first, second = scratch(1, 3)[0], scratch(1, 3)[0]
     reflected = _beyond(sought, simplex, 1.0, first)
@@ -214,9 +217,9 @@ def _improve(sought: NoiseSearch, simplex: np.ndarray, costs: np.ndarray) -> int
         else:
             _put(first, reflected, simplex, costs)
         return 2
-    outside = reflected < costs[3]
-    contracted = _beyond(sought, simplex, 0.5 if outside else -0.5, second)
-    if (contracted <= reflected) if outside else (contracted < costs[3]):
+    is_better_than_worst = reflected < costs[3]
+    contracted = _beyond(sought, simplex, 0.5 if is_better_than_worst else -0.5, second)
+    if (contracted <= reflected) if is_better_than_worst else (contracted < costs[3]):
         _put(second, contracted, simplex, costs)
         return 2
     for k in range(1, 4):
@@ -228,8 +231,8 @@ def _improve(sought: NoiseSearch, simplex: np.ndarray, costs: np.ndarray) -> int
 
 @compiled
 def _beyond(sought: NoiseSearch, simplex: np.ndarray, share: float, point: np.ndarray) -> float:
-    """Fill a point (3,), and return its cost: from the worst corner beyond the centre of the others, by a share of the
-    way to that.
+    """Fill a point (3,), and return its cost: beyond the centre of the others as seen from the worst corner, by a
+    share of the distance between the two.
     """
     for i in range(3):
         centre = (simplex[0, i] + simplex[1, i] + simplex[2, i]) / 3.0
@@ -240,7 +243,7 @@ def _beyond(sought: NoiseSearch, simplex: np.ndarray, share: float, point: np.nd
 
 @compiled
 def _put(point: np.ndarray, cost: float, simplex: np.ndarray, costs: np.ndarray) -> None:
-    """Put a point (3,) in the place of the worst corner."""
+    """Replace the worst corner by a point (3,)."""
     for i in range(3):
         simplex[3, i] = point[i]
     costs[3] = cost
@@ -255,7 +258,7 @@ def _noise_of(log: np.ndarray, time: np.ndarray, usual: SensorPrior) -> Noise:
 
 
 def _felt_directions(scaled: np.ndarray, level: float) -> np.ndarray:
-    """Return F (m, few) with F Fᵀ = J D Jᵀ but for what nobody feels."""
+    """Return F (m, few) with F Fᵀ = J D Jᵀ, without directions that hardly move the samples."""
     U, s, _ = np.linalg.svd(scaled, full_matrices=False)
     felt = s > FELT * level * np.sqrt(scaled.shape[0])
     return U[:, felt] * s[felt]
@@ -264,7 +267,8 @@ def _felt_directions(scaled: np.ndarray, level: float) -> np.ndarray:
 def _bounds(at: np.ndarray, r: np.ndarray, usual: SensorPrior) -> tuple[np.ndarray, np.ndarray]:
     """Return the lowest and highest log σ_w, log σ_s, log τ_s (3,) each.
 
-    A fit that is far from the record leaves much that is no noise, and smooth: second differences hardly see it.
+    The residual of a fit that is far from the record has a large smooth part that is no noise: second differences
+    hardly contain it.
     """
     seen = 1.4826 * float(np.median(np.abs(np.diff(r, 2)))) / np.sqrt(6.0)
     step, span = float(np.median(np.diff(at))), float(at[-1] - at[0])
@@ -276,7 +280,9 @@ def _bounds(at: np.ndarray, r: np.ndarray, usual: SensorPrior) -> tuple[np.ndarr
 
 
 def _starts(at: np.ndarray, r: np.ndarray, F: np.ndarray, usual: SensorPrior) -> np.ndarray:
-    """Return points all over the plausible (n, 3): what is left behind the parameters, divided in many ways."""
+    """Return a grid of plausible points (n, 3): the level of the residual of a linear fit, divided between the parts
+    of the noise.
+    """
     ridge = np.eye(F.shape[1]) * usual.level**2
     left = r - F @ np.linalg.solve(F.T @ F + ridge, F.T @ r)
     level = max(1.4826 * float(np.median(np.abs(left))), 0.1 * usual.level)
@@ -291,8 +297,8 @@ def _starts(at: np.ndarray, r: np.ndarray, F: np.ndarray, usual: SensorPrior) ->
 def log_marginal(
     steps: np.ndarray, unrelated: float, slow: float, lasts: float, both: np.ndarray, room: np.ndarray
 ) -> float:
-    """Return log N(r; 0, F Fᵀ + Σ), but for a constant: −½ (xᵀx − |L⁻¹ Gᵀx|²) − log det L − ½ log det Σ, with x and G
-    what Σ makes white of r and F, and L Lᵀ = I + Gᵀ G.
+    """Return log N(r; 0, F Fᵀ + Σ), up to a constant: −½ (xᵀx − |L⁻¹ Gᵀx|²) − log det L − ½ log det Σ, with x and G
+    the whitened r and F, and L Lᵀ = I + Gᵀ G.
 
     Args:
         steps: times to the next sample (m,). [s]
@@ -300,7 +306,7 @@ def log_marginal(
         slow: σ_s².
         lasts: τ_s. [s]
         both: F and, in the last column, r (m, n + 1).
-        room: to work in (n + 3, n + 1).
+        room: work space (n + 3, n + 1).
     """
     many = both.shape[1]
     expected, white, inner = room[many], room[many + 1], room[:many]
@@ -325,7 +331,9 @@ def log_marginal(
 
 @compiled
 def _log_of_square(inner: np.ndarray) -> float:
-    """Return −½ (xᵀx − |L⁻¹ Gᵀx|²) − log det L, given Gᵀ G, below it xᵀ G, and xᵀx (n + 1, n + 1), where L is left."""
+    """Return −½ (xᵀx − |L⁻¹ Gᵀx|²) − log det L, from Gᵀ G, below it xᵀ G, and xᵀx (n + 1, n + 1), which is
+    overwritten by L.
+    """
     last, log_det = inner.shape[0] - 1, 0.0
     for j in range(last + 1):
         for k in range(j + 1):

@@ -53,8 +53,8 @@ def excludes_physics(errors: Sequence[SuspectedError], work: Findings) -> bool:
     """Say whether errors need no comparison with a search of the records with them: the corrected records are
     explained without a change point and without a latent force.
     """
-    outside = max((error.log_posterior for error in work.out_of_catalogue), default=-np.inf)
-    explained = work.search.best().log_posterior > outside and leaves_only_noise(work)
+    log_other = max((error.log_posterior for error in work.out_of_catalogue), default=-np.inf)
+    explained = work.search.best().log_posterior > log_other and leaves_only_noise(work)
     return explained and all(error.excludes_physics for error in errors)
 
 
@@ -109,13 +109,13 @@ def compared(
     return [
         (
             replace(error, errors=numbers.get(id(error), error.errors)),
-            error.log_evidence(per_lost) + _of_samples_outside(error, least, records, per_lost),
+            error.log_evidence(per_lost) + _excess_of_samples_off_trial(error, least, records, per_lost),
         )
         for error in tried
     ]
 
 
-def _of_samples_outside(
+def _excess_of_samples_off_trial(
     explanation: Explained, least: Explained, records: Sequence[Logged], per_lost: Mapping[str, float]
 ) -> float:
     """Return by how much samples that a clock error or a delay puts outside the trial are more probable than an
@@ -242,8 +242,8 @@ class _Comparison:
         puts outside the trial.
         """
         per_lost = least_means([explanation, other])
-        outside = _of_samples_outside(explanation, other, self.records, per_lost)
-        return explanation.log_evidence(per_lost) + outside > other.log_evidence(per_lost)
+        excess = _excess_of_samples_off_trial(explanation, other, self.records, per_lost)
+        return explanation.log_evidence(per_lost) + excess > other.log_evidence(per_lost)
 
     def _looks(self, more: Sequence[tuple[SuspectedError, ...]]) -> list[Explained]:
         """Screen further sets of errors, and return the findings, unless interrupted."""

@@ -308,8 +308,8 @@ def numbers_again(explanation: Explained, records: Sequence[Logged]) -> Numbers:
     """
     needless: list[SuspectedError] = []
     errors, gain = list(explanation.errors), 0.0
-    outside = max((each.log_posterior for each in explanation.work.out_of_catalogue), default=-np.inf)
-    may_be_told = outside <= explanation.work.search.best().log_posterior
+    log_other = max((each.log_posterior for each in explanation.work.out_of_catalogue), default=-np.inf)
+    may_be_told = log_other <= explanation.work.search.best().log_posterior
     samples = _known(explanation.work.search, records, explanation.errors)
     for i, each in enumerate(explanation.errors):
         if each.error.kind in NUMBERED and not each.is_read_off:

@@ -332,8 +332,8 @@ class _Against:
     def few_causes_explain_more(self) -> bool:
         """Say whether soft errors with a few causes are far less probable than a few causes in their place."""
         some = self.soft
-        beside = self._with_others(self.errors, most_of_physics) if some else 0.0
-        return bool(some) and self.lead(some, most_of_physics) + beside < -FAR_BEHIND
+        log_with_errors = self._with_others(self.errors, most_of_physics) if some else 0.0
+        return bool(some) and self.lead(some, most_of_physics) + log_with_errors < -FAR_BEHIND
 
     def lead_clearly(self, some: Sequence[DataError]) -> bool:
         """Say whether some errors are far more probable than a few causes, and than one of any size, with all others

@@ -125,12 +125,12 @@ def log_beyond(
         return np.zeros(mean.shape[:-1])
     first = np.cumsum([0, *sizes[:-1]])
 
-    def log_outside(mean: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    def log_off_calibration(mean: np.ndarray, variance: np.ndarray) -> np.ndarray:
         log = -0.5 * (np.log1p(variance / within) + mean**2 / (within + variance))
         inside = np.minimum(np.add.reduceat(log, first, axis=-1), -np.finfo(float).tiny)
         return np.sum(np.log(-np.expm1(inside)), axis=-1)
 
-    return log_outside(mean, variance) - log_outside(np.zeros_like(mean), prior)
+    return log_off_calibration(mean, variance) - log_off_calibration(np.zeros_like(mean), prior)
 
 
 def freed(

@@ -248,12 +248,12 @@ class Beliefs:
             if combination in fitted
         ]
         part = max(parts, key=lambda each: fitted[each], default=())
-        promised_too_much = sum(
-            self._promised_too_much((cause_id,), fitted) for cause_id in ids if cause_id not in part
+        excess = sum(
+            self._excess_of_prediction((cause_id,), fitted) for cause_id in ids if cause_id not in part
         )
-        return fitted[part] + self.screen.adds(ids, part) - promised_too_much
+        return fitted[part] + self.screen.adds(ids, part) - excess
 
-    def _promised_too_much(self, ids: Ids, fitted: Mapping[Ids, float]) -> float:
+    def _excess_of_prediction(self, ids: Ids, fitted: Mapping[Ids, float]) -> float:
         """Return by how much the predicted gain of single causes over no cause exceeds the gain of their fits."""
         if ids not in fitted or () not in fitted:
             return 0.0

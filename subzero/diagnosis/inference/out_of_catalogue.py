@@ -311,8 +311,8 @@ def shares(
     """
     inside = search.beliefs.probabilities(search.problem)
     scale = search.beliefs.log_total()
-    outside = log_sum([each.log_posterior for each in out_of_catalogue]) if out_of_catalogue else -np.inf
-    total = log_sum([scale, outside])
+    log_added = log_sum([each.log_posterior for each in out_of_catalogue]) if out_of_catalogue else -np.inf
+    total = log_sum([scale, log_added])
     found: dict[Ids, float] = {}
     for candidate in out_of_catalogue:
         ids = (*candidate.causes, candidate.id)
@@ -407,7 +407,7 @@ def _against_noise(
     Args:
         candidate: as it is.
         what: its force or drift, whitened with the noise of "nothing is wrong".
-        log: what is added to its log evidence then.
+        log: added to its log evidence then.
         behind: the problem with that noise.
     """
 
@@ -436,9 +436,9 @@ def linear_of_first(search: Search, outside: Sequence[OutOfCatalogue]) -> tuple[
     return linear, variances(search.problem.entries, best.ids, best.kappa)
 
 
-def _first(search: Search, outside: Sequence[OutOfCatalogue]) -> OutOfCatalogue | None:
+def _first(search: Search, added: Sequence[OutOfCatalogue]) -> OutOfCatalogue | None:
     """Return the explanation that is not in the catalogue, if that is the most probable one."""
-    first = max(outside, key=lambda candidate: candidate.log_posterior, default=None)
+    first = max(added, key=lambda candidate: candidate.log_posterior, default=None)
     return first if first and first.log_posterior > search.best().log_posterior else None
 
 

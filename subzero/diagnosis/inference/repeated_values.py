@@ -104,15 +104,15 @@ def steps_off_grid(logged: Logged, trusted: frozenset[str] = frozenset()) -> lis
         known = np.flatnonzero(np.isfinite(values))
         if name in trusted or step == 0.0 or known.size < 2 * FEWEST_FROZEN:
             continue
-        beside = _off_grid((values[known] - values[known[0]]) / step)
-        first = int(np.argmax(np.abs(beside) > OFF_GRID))
-        same = np.abs(_off_grid(beside[first:] - beside[first])) < OFF_GRID
+        offsets = _off_grid((values[known] - values[known[0]]) / step)
+        first = int(np.argmax(np.abs(offsets) > OFF_GRID))
+        same = np.abs(_off_grid(offsets[first:] - offsets[first])) < OFF_GRID
         if FEWEST_FROZEN <= first <= known.size - FEWEST_FROZEN and same.all():
             found.append(
                 DataError(
                     kind="step",
                     channels=(name,),
-                    amount=float(step * np.median(beside[first:])),
+                    amount=float(step * np.median(offsets[first:])),
                     since=float(logged.record.time[known[first]]),
                 )
             )
@@ -241,8 +241,8 @@ def _is_far(value: float, at: int, values: np.ndarray, others: np.ndarray, level
     around = values[others[max(i - NEIGHBOURS, 0) : i + NEIGHBOURS]]
     spread = float(np.median(np.abs(np.diff(around)))) if around.size > 1 else 0.0
     first = max(min(i - NEAREST, others.size - 2 * NEAREST), 0)  # as many at an end, all on one side
-    beside = values[others[first : first + 2 * NEAREST]]
-    return bool(np.min(np.abs(value - beside)) > FAR_LEVELS * max(level, spread))
+    nearest = values[others[first : first + 2 * NEAREST]]
+    return bool(np.min(np.abs(value - nearest)) > FAR_LEVELS * max(level, spread))
 
 
 def _runs(values: np.ndarray) -> Repeats:

@@ -165,7 +165,7 @@ def with_limit(setting: Setting) -> tuple[Setting, Track]:
     """Return a nominal setting with a limit of work for simulations of it and of all settings derived from it; and
     its track.
     """
-    begin, grid, steps = _begun(setting)
+    begin, grid, steps = _prepared(setting)
     _run(setting, begin, grid, steps, ())
     nominal = work(begin.live) / (grid.size - 1)
     limited = replace(setting, most_work=max(USUAL_WORK, TIMES_NOMINAL * nominal))
@@ -175,22 +175,22 @@ def with_limit(setting: Setting) -> tuple[Setting, Track]:
 def with_stops(setting: Setting, times: Collection[float]) -> tuple[Track, dict[float, Stop]]:
     """Return the track of a setting, and the simulation as it was at times [s], or at the last exchange before each.
     """
-    begin, grid, steps = _begun(setting)
+    begin, grid, steps = _prepared(setting)
     done = {time: int(time / setting.trial.cable_step + 1e-6) for time in times}
     stops = _run(setting, begin, grid, steps, set(done.values()))
     kept = {time: stops[count] for time, count in done.items() if count in stops}
     return (_spread(grid, begin), begin.track), kept
 
 
-def _begun(setting: Setting) -> tuple[Stop, np.ndarray, int]:
+def _prepared(setting: Setting) -> tuple[Stop, np.ndarray, int]:
     """Return the simulation of a setting before its first exchange, the times of exchanges, and the hull's steps in
     one.
     """
     trial = setting.trial
     # Even segments, whatever the initial length: with a mesh that changes with the length the response has no slope.
-    room = 16 + int(FASTEST_PAY_OUT * trial.duration / trial.segment_length)
+    nodes = 16 + int(FASTEST_PAY_OUT * trial.duration / trial.segment_length)
     setup, live = prepare(
-        trial, setting.model, setting.tethered, longest_exchange=trial.cable_step, run_in=0.0, room=room
+        trial, setting.model, setting.tethered, longest_exchange=trial.cable_step, run_in=0.0, room=nodes
     )
     _ease(setup)
     grid, steps = _exchanges(setting)

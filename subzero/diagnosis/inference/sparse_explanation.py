@@ -94,7 +94,7 @@ def most_of_physics(problem: Problem, record: int) -> float:
         record: its number.
     """
     here = _linear(problem, record)
-    started = _begun(problem, record, here)
+    started = _onset_responses(problem, record, here)
     now, log_prior = here.reckoned(), float(np.log(PRIOR["none"]))
     best = none = now.log + log_prior
     for _ in range(MAX_CAUSES):
@@ -182,7 +182,7 @@ def _linear(problem: Problem, record: int, z: np.ndarray | None = None) -> Linea
     return Linear(r=r, J=J, D=variances(problem.entries, (), KAPPA_NARROW), own=own, bare=bare)
 
 
-def _begun(problem: Problem, record: int, here: Linear) -> dict[Begun, np.ndarray]:
+def _onset_responses(problem: Problem, record: int, here: Linear) -> dict[Begun, np.ndarray]:
     """Return the responses to causes that begin at onsets of a grid, in the rows of a record (m, parameters)."""
     along = in_rough_steps(BaseRun(problem, np.zeros(len(problem.entries))))
     before = sum(noise.count for each in problem.records[:record] for noise in each.noise.values())

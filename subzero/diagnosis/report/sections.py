@@ -54,8 +54,8 @@ def _explanations(verdict: Verdict) -> list[str | tables.Table]:
     if verdict.rivals:
         undecided = verdict.on_model == UNDECIDED
         what = "What the records allow" if undecided else "What else the records allow"
-        beside = "what is most probable" if undecided else "what is told"
-        parts += [f"{what} (D: how far from {beside}):", tables.rivals(verdict)]
+        reference = "what is most probable" if undecided else "what is told"
+        parts += [f"{what} (D: how far from {reference}):", tables.rivals(verdict)]
     return parts
 
 

@@ -233,7 +233,7 @@ def sentence(verdict: Verdict) -> str:
 
 
 def on_model(verdict: Verdict) -> str:
-    """Return the verdict on the model; of explanations that cannot be told apart only the first few."""
+    """Return the verdict on the model; of indistinguishable explanations only the first few."""
     if verdict.on_model == UNDECIDED:
         return _undecided(verdict)
     if verdict.on_model == OUTSIDE and verdict.unknown is not None:

@@ -176,7 +176,7 @@ def decided(findings: Findings, ranked: Ranked) -> str:
 def _explanation(
     findings: Findings, ranked: Ranked, verdict: str
 ) -> tuple[Sequence[Entry], np.ndarray, Ids, float]:
-    """Return the numbers of the explanation that a verdict is about, their deviations (k,), the causes it names, and
+    """Return the entries of the explanation that a verdict is about, their deviations (k,), the causes it names, and
     the scale κ of the tolerances under which it is most probable.
     """
     best, entries = ranked.best, findings.problem.entries

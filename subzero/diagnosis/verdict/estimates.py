@@ -294,9 +294,9 @@ def of_nothing(work: Findings, best: Candidate) -> Extension:
 def most_probable_force(work: Findings) -> tuple[OutOfCatalogue, LatentForceCandidate]:
     """Return the most probable latent force or drift, with the causes that it was found with."""
     return next(
-        (outside, outside.what)
-        for outside in work.out_of_catalogue
-        if isinstance(outside.what, LatentForceCandidate)
+        (candidate, candidate.what)
+        for candidate in work.out_of_catalogue
+        if isinstance(candidate.what, LatentForceCandidate)
     )
 
 

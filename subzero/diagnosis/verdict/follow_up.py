@@ -76,13 +76,13 @@ MAX_SURVIVORS = 4
 
 def ranked(findings: Findings) -> Ranked:
     """Return all explanations by their probability, with the closest rivals of the first."""
-    inside, outside = shares(findings.search, findings.out_of_catalogue)
+    inside, added = shares(findings.search, findings.out_of_catalogue)
     candidates = findings.search.candidates
     best = candidates[max((ids for ids in inside if ids in candidates), key=lambda ids: inside[ids])]
     change_points = _change_points(findings)
     return Ranked(
         inside=inside,
-        outside=outside,
+        outside=added,
         close_to_change_point=_closest(findings, change_points[0]) if change_points else ClosestRival(),
         best=best,
         close_to_best=_close_to(findings, best, practical_of(findings, best)),
@@ -266,28 +266,28 @@ def _next_trial(
 def _curves(
     findings: Findings, verdict: str, new: Extension, known: Ranked, rivals: Sequence[Ids]
 ) -> dict[str, Curves]:
-    """Return record → curves of the nominal model, of the refits, and of as many rivals as are drawn, in their order:
-    causes that hold throughout, those that began in mid-trial, forces and drifts, each with the problem that it was
+    """Return record → curves of the nominal model, of the refits, and of the rivals that are drawn, in their order:
+    causes that hold throughout, those that began in mid-trial, forces and drifts, each in the problem that it was
     fitted in.
     """
     candidates = findings.search.candidates
     late: dict[Ids, FittedChangePoint] = {(point.id,): point for point in _change_points(findings)}
     fits: dict[str, Fit | None] = {"nominal": None, "tolerance": candidates[()].fit}
     fits |= {"extended": new.fit} if verdict in (CAUSE_NAMED, OUTSIDE) else {}
-    outside = {(*candidate.causes, candidate.id): candidate for candidate in findings.out_of_catalogue}
+    added = {(*candidate.causes, candidate.id): candidate for candidate in findings.out_of_catalogue}
     if verdict == UNDECIDED:
         drawn = [ids for ids in worth_naming(known.probabilities) if ids]
     else:
         drawn = [ids for ids in rivals if ids in candidates or ids in late][: RIVALS_DRAWN[verdict]]
     fits |= {f"rival: {name(ids)}": candidates[ids].fit for ids in drawn if ids in candidates}
     found = curves(new.problem, fits)
-    for ids in (ids for ids in drawn if ids not in candidates and (ids in late or ids in outside)):
+    for ids in (ids for ids in drawn if ids not in candidates and (ids in late or ids in added)):
         label = f"rival: {name(ids)}"
-        what = late.get(ids) or outside[ids].what
+        what = late.get(ids) or added[ids].what
         if isinstance(what, FittedChangePoint):
             own = curves(what.problem, {label: what.fit})
         else:
-            own = curves_outside(findings, outside[ids], label)
+            own = curves_outside(findings, added[ids], label)
         found = {
             record: replace(candidate, models={**candidate.models, **own[record].models})
             for record, candidate in found.items()
