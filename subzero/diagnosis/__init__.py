@@ -2,8 +2,8 @@
 
     records + nominal model → residuals → linearisation → evidence of every hypothesis → MAP fits → verdict
 
-Bayesian variable selection on the parameters of a simulator. A hypothesis is a set of causes: their parameters have the
-wide prior N(0, s²), all others the narrow one N(0, (κτ)²). Its evidence is Laplace's, around a MAP fit with real
+Bayesian variable selection on the parameters of a simulator. A hypothesis is a set of causes: their parameters have
+the wide prior N(0, s²), all others the narrow one N(0, (κτ)²). Its evidence is Laplace's, around a MAP fit with real
 simulations, mixed over κ. Change points and latent forces compete with the causes on the same scale.
 
 symbol       name                                                     unit          module

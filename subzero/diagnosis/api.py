@@ -451,7 +451,9 @@ def _with_errors(
         name: replace(own, recorded=_recorded(records, explanation.errors, name))
         for name, own in after.curves.items()
     }
-    listed = {_name_with_errors(explanation.errors, name): share * p for name, p in after.probabilities.items()}
+    listed = {
+        _name_with_errors(explanation.errors, name): share * p for name, p in after.probabilities.items()
+    }
     words = " ".join(f"{error.record}: {error.sentence}: {error.remedy}." for error in errors)
     return replace(
         after,
@@ -498,7 +500,9 @@ def _with_possible(
         probability=probability,
         discrimination=np.nan,
     )
-    drawn = _with_planted(reported.curves, records, more, further, f"rival: {_name_with_errors(more.errors, 'none')}")
+    drawn = _with_planted(
+        reported.curves, records, more, further, f"rival: {_name_with_errors(more.errors, 'none')}"
+    )
     rivals = tuple(sorted([*reported.rivals, rival], key=lambda each: -each.probability))
     ranked = dict(sorted(listed.items(), key=lambda pair: -pair[1]))
     with_rival = replace(

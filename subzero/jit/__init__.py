@@ -1,4 +1,4 @@
-"""Compile physics, and keep the compiled code: the part of subzero that every package of physics may import.
+"""Compile physics, and keep the compiled code: the only part of subzero that the packages of physics use.
 
 name                                            purpose                                               file
 ----------------------------------------------  ----------------------------------------------------  ------------

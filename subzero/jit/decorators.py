@@ -69,6 +69,7 @@ def _compile(function: Function, kind: type[Kernel], **more: bool) -> Function:
     """Return the compiled function; arrays are not counted unless `more` says so."""
     if numba.config.DISABLE_JIT:
         return function
+    # As in numpy, division by 0 gives an infinity; without the GIL, simulations run in threads side by side.
     options = {
         "nopython": True,
         "error_model": "numpy",
@@ -116,12 +117,14 @@ class InnerKernel(Kernel):
 
     def add_overload(self, made: Any) -> None:
         """Remember the compiled code, but not for calls from Python."""
+        # numba would also register the entry point for calls from Python, which this function lacks.
         self.overloads[tuple(made.signature.args)] = made
 
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
     """Compile at our level of optimisation, without signals, and without garbage collection, an eighth of the time."""
+    # These settings are global: they are restored even if compiling fails.
     level, collects = numba.config.OPT, gc.isenabled()
     with deferred_signals():
         numba.config.OPT = LEVEL
@@ -139,7 +142,7 @@ def by_field(
 ) -> Callable[[Line, General], Result]:
     """Return a function (line, c) that is `yes` where the record c has a field, else `no`; only one is compiled.
 
-    What few runs need so does not lengthen the first compilation of all others.
+    So a feature of few simulations does not lengthen the first compilation of all others.
     """
 
     def choose(line, c):  # type: ignore[no-untyped-def]  # numba compares annotations of the two, too

@@ -75,6 +75,7 @@ def digest_of(room: str, file: Path | None = None) -> str:
     """Return twelve hexadecimal digits that change with the sources, as `sources_of`, the compiler and its settings."""
     digest = hashlib.sha256(repr((_compiler(), room)).encode())
     for path in sources_of(room, file):
+        # The name counts, too: a module that is renamed is another source.
         name = path.relative_to(ROOT) if path.is_relative_to(ROOT) else path
         digest.update(repr((str(name), path.read_bytes())).encode())
     return digest.hexdigest()[:12]
@@ -120,6 +121,7 @@ def _is_private(folder: Path) -> bool:
 
 def _compiler() -> tuple[Any, ...]:
     """Return the dependencies of compiled code other than its sources and the processor."""
+    # Settings of numba that do not change the machine code.
     no_matter = ("CACHE", "THREAD", "COLOR", "GDB", "CUDA")
     settings = {
         name: value
@@ -169,6 +171,7 @@ class MachineCode:
         function, folder = self._function, folder_of(self._digest) if self._digest else None
         if folder is None:
             return None
+        # `magic_tuple` has the processor and its features: several machines may share a home folder.
         what = (function.__module__, function.__qualname__, function.__code__.co_firstlineno)
         digest = hashlib.sha256(repr((what, str(signature), codegen.magic_tuple())).encode()).hexdigest()
         return folder / f"{function.__name__[:80]}-{digest[:24]}{SUFFIX}"
@@ -182,6 +185,7 @@ class MachineCode:
             wait_for(file, deliver_pending)
             if code := _read(file):
                 found = CompileResult._rebuild(target_context, *pickle.loads(code))
+                # A file's name has only a digest of the signature, which might collide with that of others.
                 if found.signature.args == tuple(normalize_signature(signature)[0]):
                     return found
         while _announcements:
@@ -212,6 +216,7 @@ def _read(file: Path) -> bytes | None:
         data = file.read_bytes()
     except OSError:
         return None
+    # The digest includes the file's name: code under another name counts as damaged.
     code = data[32:]
     return code if data[:32] == hashlib.sha256(file.name.encode() + code).digest() else None
 
@@ -219,6 +224,7 @@ def _read(file: Path) -> bytes | None:
 def _write(file: Path, code: bytes) -> None:
     """Write a file with this code atomically."""
     try:
+        # In the same folder, as a file can be replaced atomically only within a file system.
         handle, unfinished = tempfile.mkstemp(dir=file.parent)
         try:
             with open(handle, "wb") as out:

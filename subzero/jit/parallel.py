@@ -42,6 +42,7 @@ def compile_in_parallel(calls: Callable[[], Sequence[Call]]) -> None:
     Args:
         calls: returns the functions that this process is to compile, in order.
     """
+    # Else each process of a pool would start one of its own.
     is_alone = parent_process() is None and threading.current_thread() is threading.main_thread()
     if _process or numba.config.DISABLE_JIT or not is_alone or _cores() == 1 or not sys.executable:
         return
@@ -50,6 +51,7 @@ def compile_in_parallel(calls: Callable[[], Sequence[Call]]) -> None:
     wanted = calls()
     codegen = cpu_target.target_context.codegen()
     files = [function.machine_code.file_for(types, codegen) for function, types in wanted]  # type: ignore[attr-defined]
+    # Nothing can be kept, or a run before has kept some already: a second process would hardly help.
     if None in files or any(file.exists() for file in files):
         return
     with suppress(OSError):  # no second process can be started: this one compiles all

@@ -9,7 +9,8 @@
     >>> spring
     Spring(stiffness=2.0, place=[0. 5. 0.], is_taut=True)
 
-A compiled function takes a named tuple field by field, and a record as one pointer: that halves the first compilation.
+A compiled function takes a named tuple field by field, and a record as one pointer: that halves the first
+compilation.
 """
 
 from __future__ import annotations
@@ -40,7 +41,8 @@ else:
 
 @dataclass_transform()
 class Record(Memory):
-    """Numbers, arrays, records and tuples of records in one piece of memory; a class declares them as a dataclass does.
+    """Numbers, arrays, records and tuples of records in one piece of memory; a class declares them as a dataclass
+    does.
 
     Values are copied into a record. Fields are read and written by their names; an array among them is a view of the
     record's memory. Records of a class whose arrays differ in shape or kind differ in layout, and a function is
@@ -61,6 +63,7 @@ class Record(Memory):
     def __init_subclass__(cls) -> None:
         """Read the fields that a class declares."""
         added = [name for name, kind in get_annotations(cls).items() if "ClassVar" not in str(kind)]
+        # An attribute of `numpy.void` would hide a field of the same name.
         taken = [name for name in added if hasattr(np.void, name)]
         if taken:
             raise TypeError(f"{cls.__name__}: every record has {', '.join(taken)} already. Take other names.")
@@ -78,6 +81,7 @@ class Record(Memory):
         made_of = (cls, *[kind for _, kind in parts])
         if made_of not in _layouts:
             fields = [(name, _layout(given[name])) for name in cls.names]
+            # With the class as the type of elements, `memory[0]` is an instance of it.
             _layouts[made_of] = np.dtype((cls, fields))
         memory = np.zeros(1, dtype=_layouts[made_of])
         memory[0] = tuple([value for value, _ in parts])

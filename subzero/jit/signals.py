@@ -25,6 +25,7 @@ def deferred_signals() -> Iterator[None]:
     """Defer the signals that Python handles until the end of the block; in other threads than the main one, do
     nothing.
     """
+    # In nested blocks the outermost one defers; Python handles signals in its main thread only.
     if _handlers or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -36,6 +37,7 @@ def deferred_signals() -> Iterator[None]:
                     signal.signal(number, _defer)
         yield
     finally:
+        # All handlers are restored before the first one is called, as that may raise.
         handlers = dict(_handlers)
         for deferred, handler in handlers.items():
             with suppress(ValueError):

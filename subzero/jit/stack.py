@@ -23,6 +23,7 @@ def _interpreted(rows: int, columns: int) -> np.ndarray:
 @intrinsic(prefer_literal=True)  # type: ignore[untyped-decorator]  # numba has no types
 def _on_stack(context: Any, rows: Any, columns: Any) -> Any:
     """Return an uninitialised array (rows, columns), valid until the calling function returns."""
+    # The size of a stack frame is fixed when the function is compiled.
     if not (isinstance(rows, types.IntegerLiteral) and isinstance(columns, types.IntegerLiteral)):
         return None
     shape = rows.literal_value, columns.literal_value
@@ -30,6 +31,7 @@ def _on_stack(context: Any, rows: Any, columns: Any) -> Any:
 
     def generate(target: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         array = target.make_array(kind)(target, builder)
+        # Allocated where the function begins: in a loop the stack does not grow.
         memory = cgutils.alloca_once(builder, ir.DoubleType(), size=shape[0] * shape[1])
         sizes = [target.get_constant(types.intp, n) for n in shape]
         strides = [target.get_constant(types.intp, n) for n in (8 * shape[1], 8)]

@@ -1,4 +1,5 @@
-"""An effect as data: an id, a sentence, its parameters, and how it changes a setting; throughout, or from an onset on.
+"""An effect as data: an id, a sentence, its parameters, and how it changes a setting; throughout, or from an onset
+on.
 
 θ = θ₀ + z                                          throughout; z = 0 is the nominal model, exactly
 θ(t) = θ₀ for t < t₀,   θ₀ + z from t₀ on           with an onset: a fin struck at 12 s, the cable caught at 20 s

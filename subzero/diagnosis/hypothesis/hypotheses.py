@@ -1,8 +1,8 @@
 """The parameter vector z, the hypotheses about it, and a table of their prior probabilities.
 
-z holds the parameters of all effects, which all records share, and then the start of each record. A hypothesis is a set
-of causes, whose entries get the prior variance s² instead of (κτ)². With its numbers, by name, it is an extended model,
-and `apply_extended` makes a setting of that.
+z holds the parameters of all effects, which all records share, and then the start of each record. A hypothesis is a
+set of causes, whose entries get the prior variance s² instead of (κτ)². With its numbers, by name, it is an extended
+model, and `apply_extended` makes a setting of that.
 """
 
 from __future__ import annotations

@@ -75,6 +75,8 @@ class Noise:
     def sd_of_mean(self, samples: int, span: float) -> float:
         """Return the standard deviation of the mean of samples that are evenly spread over a span [s]."""
         x = max(span, 1e-9) / self.correlation_time
+        # Variance of the mean of the slow part over the span, over σ_s²; its limit for x → 0, where the formula loses
+        # its digits, is 1.
         lasting = 2.0 * (x - 1.0 + np.exp(-x)) / x**2 if x > 1e-3 else 1.0
         return float(np.sqrt(self.unrelated / max(samples, 1) + self.slow**2 * lasting))
 
@@ -83,6 +85,7 @@ class Noise:
         """The decay of the slow part to the next sample, the Kalman gain, and the innovations' standard deviation
         (m,).
         """
+        # The last step is 0: there is no next sample, and that decay is not used.
         kept = np.exp(-np.diff(self.time, append=self.time[-1:]) / self.correlation_time)
         gain, scale = np.empty(self.count), np.empty(self.count)
         gains_of(kept, self.unrelated, self.slow**2, gain, scale)
@@ -101,6 +104,7 @@ class Noise:
 
     def whiten_again(self, white: np.ndarray, before: Noise) -> np.ndarray:
         """Return values (m, …) that are whitened with another noise of the same samples, whitened with this one."""
+        # Both are recursions of order m: no covariance is formed.
         return self._innovations(before.colour(white))
 
     def colour(self, white: np.ndarray) -> np.ndarray:
@@ -131,6 +135,7 @@ def gains_of(kept: np.ndarray, white: float, slow: float, gain: np.ndarray, scal
         seen = left + white
         gain[i] = left / seen
         scale[i] = np.sqrt(seen)
+        # The variance after the update decays to the next sample, and the process adds to it.
         left = kept[i] * kept[i] * left * (1.0 - gain[i]) + slow * (1.0 - kept[i] * kept[i])
 
 
@@ -146,6 +151,7 @@ def innovations(
         for i in range(values.shape[0]):
             new = values[i, j] - expected
             white[i, j] = new / scale[i]
+            # The Kalman update, then the decay to the next sample.
             expected = kept[i] * (expected + gain[i] * new)
 
 
@@ -192,6 +198,7 @@ def innovations_between(
     expected[:] = 0.0
     for i in range(kept.size):
         low, share = places.low[i], places.share[i]
+        # Interpolated and filtered in one pass: the interpolated columns are never stored.
         for j in range(rows.shape[1]):
             new = (1.0 - share) * rows[low, j] + share * rows[low + 1, j] - expected[j]
             white[i, j] = new / scale[i]
@@ -275,8 +282,8 @@ def level_of(channel: str, known: Mapping[str, float]) -> float:
 def sensor_prior(
     channel: str, values: np.ndarray, known: Mapping[str, float], steps: Mapping[str, float] = NOT_KNOWN
 ) -> SensorPrior:
-    """Return what a channel's sensor is like, before anything is fitted: its level as known or usual, its resolution as
-    its values (n,) show it, or as more of them have shown: channel → step.
+    """Return the prior of a channel's sensor, before any fit: its level as known or usual, its resolution as read off
+    its values (n,), or off more of them before: channel → step.
     """
     level = level_of(channel, known)
     step = steps[channel] if channel in steps else resolution_of(values, level)
@@ -291,6 +298,7 @@ def prior_noise(time: np.ndarray, used: np.ndarray, usual: SensorPrior) -> Noise
         used: which of them are used (n,).
         usual: the prior of the sensor.
     """
+    # A known level is that of both parts together, in their usual ratio; the usual level is that of the white part.
     slow = usual.level if usual.is_known else slow_usual(usual)
     share = SLOW_SHARE / np.sqrt(1.0 + SLOW_SHARE**2) if usual.is_known else 1.0
     white = np.sqrt(max(1.0 - share**2, 0.0)) * usual.level if usual.is_known else usual.level
@@ -315,15 +323,19 @@ def resolution_of(values: np.ndarray, level: float) -> float:
     """
     known = values[np.isfinite(values)]
     ordered = np.sort(known)
+    # The first of each run of equal values, as of `np.unique`; the slice is for a channel without any value.
     first = np.flatnonzero(np.concatenate([[True], ordered[1:] != ordered[:-1]])[: known.size])
     distinct, times = ordered[first], np.diff(first, append=known.size)
+    # One value throughout: q/√12, the standard deviation of its rounding, is set to the level.
     if distinct.size == 1 and known.size >= FEWEST:
         return float(np.sqrt(12.0) * level)
     changes = np.abs(known[1:] - known[:-1])
     changes, exact = changes[changes > SAME * level], EXACT * level
     by_change = whole_step(changes, exact, _few_of(changes)) if changes.size >= FEWEST else 0.0
+    # Few values, hardly any of them repeated, may be multiples of a step by chance.
     if distinct.size < 2 or (distinct.size < FEWEST and 2 * distinct.size > known.size):
         return by_change
+    # A channel that hardly ever leaves a value: its steps from that value.
     away = np.abs(known - distinct[np.argmax(times)])
     away = away[away > SAME * level]
     few, between = min((1.0 - MOSTLY) * known.size, FEW_WRONG * away.size), distinct[1:] - distinct[:-1]
@@ -345,6 +357,7 @@ def whole_step(steps: np.ndarray, exact: float, most: float) -> float:
         least = min(least, steps[i])
     ratio = 0.0
     for _ in range(STEPS_TRIED):
+        # The least step may be a fraction of the sensor's (a jump), so larger ones are tried, too.
         ratio = _next_ratio(steps, least, ratio)
         if ratio == np.inf:
             return 0.0
@@ -360,6 +373,7 @@ def _next_ratio(steps: np.ndarray, least: float, before: float) -> float:
     for i in range(steps.size):
         ratio = steps[i] / least
         if before < ratio < found:
+            # Steps that differ only by errors of arithmetic become one ratio.
             ratio = np.rint(ratio * 1e6) / 1e6
             if before < ratio < found:
                 found = ratio
@@ -397,6 +411,7 @@ def correlation_times_of(noise: Mapping[str, Noise]) -> dict[str, CorrelationTim
         for name, each in noise.items()
         if each.slow**2 >= SEEN_SLOW**2 * each.unrelated
     }
+    # Without the channel itself: its own time must not be a part of its prior.
     others = {name: np.log([time for other, time in slow.items() if other != name]) for name in noise}
     return {name: _about_their_median(logs) for name, logs in others.items() if logs.size >= FEWEST_CHANNELS}
 
@@ -428,6 +443,7 @@ def prior_of(usual: SensorPrior) -> Prior:
     mean = np.log([usual.level, slow_usual(usual), time])
     below, above = (np.array([WHITE_SPREAD, each, spread]) for each in (SLOW_SPREAD, SLOW_SPREAD_ABOVE))
     level = float(mean[0]) if usual.is_known else np.nan
+    # Normalised, so that noises under priors with and without other channels can be compared.
     most = float(np.log(TIME_SPREAD / spread)) + _log_height(freedom)
     return Prior(mean, below, above, freedom, level, most)
 
@@ -446,9 +462,12 @@ def log_density(log: np.ndarray, prior: Prior) -> float:
     about = 0.0
     for i in range(3):
         apart = log[i] - prior.mean[i]
+        # A split normal distribution: its spread differs below and above the mean.
         square = (apart / (prior.above[i] if apart > 0.0 else prior.below[i])) ** 2
+        # Only log τ_s may have a Student t distribution, with heavier tails.
         far = i == 2 and prior.freedom < np.inf
         about += (prior.freedom + 1.0) * np.log1p(square / prior.freedom) if far else square
+    # Not NaN: the level is known, and both parts together have to agree with it.
     if prior.level == prior.level:
         level = 0.5 * np.log(np.exp(2.0 * log[0]) + np.exp(2.0 * log[1]))
         about += ((level - prior.level) / KNOWN_SPREAD) ** 2
@@ -474,6 +493,7 @@ def log_of_outliers(count: int, measured: int, level: float) -> float:
         level: usual one of the sensor, in the channel's unit.
     """
     a, b = OUTLIERS_BEFORE
+    # No binomial coefficient: these samples are the outliers, not any others.
     which = betaln(a + count, b + measured - count) - betaln(a, b)
     return float(which) - count * float(np.log(OUTLIER_LEVELS * level))
 
@@ -525,6 +545,7 @@ def medians_around(values: np.ndarray, around: np.ndarray) -> None:
 @compiled
 def _median_of(values: np.ndarray, first: int, count: int) -> float:
     """Return the median of `count` values, an odd number up to seven, from `first` on."""
+    # Insertion sort in an array on the stack: there are seven values at most.
     row = scratch(1, 7)[0]
     for k in range(count):
         at = k

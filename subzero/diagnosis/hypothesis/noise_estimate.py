@@ -92,27 +92,30 @@ class NoiseSearch(NamedTuple):
 def estimate(
     time: np.ndarray, behind: ResidualNoise, usual: SensorPrior, known: Noise | None = None
 ) -> Noise:
-    """Return the most probable noise of a channel behind a fit.
+    """Return the most probable noise of a channel, from the residual of a fit.
 
     Args:
         time: of the samples that are used (m,). [s]
-        behind: what the fit leaves.
+        behind: residual and sensitivities of the fit.
         usual: the prior of the sensor.
-        known: as it was found behind something else; the search begins there, too.
+        known: an estimate from another fit; the search is started from it, too.
 
     Returns:
         noise of which all these samples are used.
     """
     if time.size < FEWEST:
         return prior_noise(time, np.ones(time.size, dtype=bool), usual)
+    # F has few columns: with it a likelihood costs of the order of m n² instead of m³.
     r, F = behind.residual, _felt_directions(behind.J * np.sqrt(behind.D), usual.level)
     steps, both = np.diff(time, append=time[-1:]), np.column_stack([F, r])
+    # One work space for all evaluations, as compiled code allocates nothing.
     room = np.empty((both.shape[1] + 2, both.shape[1]))
     sought = NoiseSearch(
         steps, both, usual.resolution**2 / 12.0, prior_of(usual), *_bounds(time, r, usual), room
     )
     starts = _starts(time, r, F, usual)
     if known is not None:
+        # The known estimate is always refined, whatever its rank among the starts.
         there = np.log([known.white, known.slow, known.correlation_time])
         starts = np.vstack([starts, np.clip(there, sought.low, sought.high)])
     costs = np.empty(len(starts))
@@ -147,6 +150,7 @@ def descend(sought: NoiseSearch, point: np.ndarray) -> float:
     """Overwrite a point (3,) with the minimum found from it, and return its cost."""
     simplex, costs = scratch(4, 3), scratch(1, 4)[0]
     for k in range(4):
+        # The first corner, with number −1, is the point itself.
         _corner(sought, point, k - 1, simplex[k])
         costs[k] = _cost(sought, simplex[k])
     asked = 4
@@ -161,13 +165,13 @@ def descend(sought: NoiseSearch, point: np.ndarray) -> float:
 
 @compiled
 def _corner(sought: NoiseSearch, point: np.ndarray, moved: int, corner: np.ndarray) -> None:
-    """Fill a corner of the first simplex (3,): the point with one of its numbers moved, reflected at an upper bound.
-    """
+    """Fill a corner of the first simplex (3,): the point with one of its numbers moved, reflected at an upper bound."""
     for i in range(3):
         corner[i] = point[i]
         if i == moved:
             corner[i] = (1.0 + FIRST_MOVE) * point[i] if point[i] != 0.0 else FIRST_MOVE_OF_0
             if corner[i] > sought.high[i]:
+                # Clipped instead, a corner might coincide with a point at the bound: the simplex would be flat.
                 corner[i] = 2.0 * sought.high[i] - corner[i]
     _clip(sought, corner)
 
@@ -184,6 +188,7 @@ def _sort(simplex: np.ndarray, costs: np.ndarray) -> None:
     """Sort the corners by their costs, the best first."""
     for k in range(1, 4):
         for at in range(k, 0, -1):
+            # Equal costs keep their order.
             if not costs[at] < costs[at - 1]:
                 break
             costs[at], costs[at - 1] = costs[at - 1], costs[at]
@@ -203,8 +208,8 @@ def _is_settled(simplex: np.ndarray, costs: np.ndarray) -> bool:
 
 @compiled
 def _improve(sought: NoiseSearch, simplex: np.ndarray, costs: np.ndarray) -> int:
-    """Replace the worst corner by a better point, or shrink all towards the best; return the number of evaluations.
-    """
+    """Replace the worst corner by a better point, or shrink all towards the best; return the number of evaluations."""
+    # Each branch returns its number of evaluations: 1, 2, or 5 with the three corners that shrink.
     first, second = scratch(1, 3)[0], scratch(1, 3)[0]
     reflected = _beyond(sought, simplex, 1.0, first)
     if costs[0] <= reflected < costs[2]:
@@ -217,6 +222,7 @@ def _improve(sought: NoiseSearch, simplex: np.ndarray, costs: np.ndarray) -> int
         else:
             _put(first, reflected, simplex, costs)
         return 2
+    # Contract on the side of the better one of the reflected point and the worst corner.
     is_better_than_worst = reflected < costs[3]
     contracted = _beyond(sought, simplex, 0.5 if is_better_than_worst else -0.5, second)
     if (contracted <= reflected) if is_better_than_worst else (contracted < costs[3]):
@@ -259,6 +265,7 @@ def _noise_of(log: np.ndarray, time: np.ndarray, usual: SensorPrior) -> Noise:
 
 def _felt_directions(scaled: np.ndarray, level: float) -> np.ndarray:
     """Return F (m, few) with F Fᵀ = J D Jᵀ, without directions that hardly move the samples."""
+    # U s² Uᵀ is J D Jᵀ; s/√m is the root mean square effect of a direction on the samples.
     U, s, _ = np.linalg.svd(scaled, full_matrices=False)
     felt = s > FELT * level * np.sqrt(scaled.shape[0])
     return U[:, felt] * s[felt]
@@ -270,6 +277,8 @@ def _bounds(at: np.ndarray, r: np.ndarray, usual: SensorPrior) -> tuple[np.ndarr
     The residual of a fit that is far from the record has a large smooth part that is no noise: second differences
     hardly contain it.
     """
+    # Second differences of white noise have the variance 6 σ²; 1.4826 times the median deviation of normal noise is
+    # its standard deviation.
     seen = 1.4826 * float(np.median(np.abs(np.diff(r, 2)))) / np.sqrt(6.0)
     step, span = float(np.median(np.diff(at))), float(at[-1] - at[0])
     shortest = SHORTEST * step
@@ -283,12 +292,14 @@ def _starts(at: np.ndarray, r: np.ndarray, F: np.ndarray, usual: SensorPrior) ->
     """Return a grid of plausible points (n, 3): the level of the residual of a linear fit, divided between the parts
     of the noise.
     """
+    # Ridge regression, with white noise of the usual level, removes what the parameters can follow.
     ridge = np.eye(F.shape[1]) * usual.level**2
     left = r - F @ np.linalg.solve(F.T @ F + ridge, F.T @ r)
     level = max(1.4826 * float(np.median(np.abs(left))), 0.1 * usual.level)
     low, high = _bounds(at, r, usual)
     times = np.linspace(low[2], high[2], TIMES + 2)[1:-1]
     ratio, share, time = (axis.ravel() for axis in np.meshgrid(RATIOS, LEVELS, times, indexing="ij"))
+    # Both parts together have the level share · level.
     white = share * level / np.sqrt(1.0 + ratio**2)
     return np.clip(np.column_stack([np.log(white), np.log(ratio * white), time]), low, high)
 
@@ -313,7 +324,9 @@ def log_marginal(
     expected[:] = 0.0
     inner[:] = 0.0
     left, log_scale, kept = slow, 0.0, 0.0
+    # One pass over the samples: the filter of `noise` for all columns, and the products of the whitened columns.
     for i in range(both.shape[0]):
+        # Most records are evenly sampled, and the exponential is the costliest operation here.
         if i == 0 or steps[i] != steps[i - 1]:
             kept = np.exp(-steps[i] / lasts)
         seen = left + unrelated
@@ -335,6 +348,8 @@ def _log_of_square(inner: np.ndarray) -> float:
     overwritten by L.
     """
     last, log_det = inner.shape[0] - 1, 0.0
+    # Cholesky decomposition in place, with r as a last row: that becomes (L⁻¹ Gᵀx)ᵀ, and its last element, without a
+    # root, xᵀx − |L⁻¹ Gᵀx|².
     for j in range(last + 1):
         for k in range(j + 1):
             value = inner[j, k] + (1.0 if j == k and j < last else 0.0)

@@ -184,7 +184,7 @@ class _Comparison:
         elif not explain(errors):
             self.look.finish(now.work)
             new, more = [], [] if leaves_only_noise(now.work) else more
-        self._race(new + self._looks(more if len(self.tried) == 1 else []))
+        self._finish_likeliest(new + self._looks(more if len(self.tried) == 1 else []))
 
     def with_fewer(self) -> None:
         """Compare errors that are not clear with sets in which fewer of them are corrected."""
@@ -192,7 +192,7 @@ class _Comparison:
         for held, errors in pairwise([self.suspicion.first(least), *self.suspicion.fewer(least)]):
             if excludes_physics(held, _first(self.tried).work):
                 break
-            self._race(self._looks([errors]))
+            self._finish_likeliest(self._looks([errors]))
 
     def numbers_again(self) -> dict[int, tuple[SuspectedError, ...]]:
         """Estimate the numbers of the most probable errors again, given the explanation of the records, and search
@@ -222,7 +222,7 @@ class _Comparison:
             error for error in self.tried if not _holds_one(error, gone) and error.errors != left
         ]
         try:
-            self._race([self._look_at(left, self.look.start(without(self.records, left)))])
+            self._finish_likeliest([self._look_at(left, self.look.start(without(self.records, left)))])
         except KeyboardInterrupt:
             self.tried[:] = self.tried or before
             raise
@@ -232,7 +232,7 @@ class _Comparison:
         drop the other.
         """
         new = self._look_at(errors, self.look.start(without(self.records, errors)))
-        self._race([new])
+        self._finish_likeliest([new])
         more, less = (old, new) if self._explains_more(old, new) else (new, old)
         self.tried.remove(less)
         return more
@@ -286,7 +286,7 @@ class _Comparison:
         now = self._explained(errors, work)
         return any(now.is_less_probable(suspect) for suspect in better)
 
-    def _race(self, new: Sequence[Explained]) -> None:
+    def _finish_likeliest(self, new: Sequence[Explained]) -> None:
         """Finish the search of those of the new sets that may be the most probable one."""
         waiting = [error for error in new if not error.work.given_up]
         while waiting and _is_complete(self.tried):

@@ -205,8 +205,7 @@ class Explained:
         return {name: total[name] / count for name, count in samples.items() if count}
 
     def is_less_probable(self, other: Explained) -> bool:
-        """Say whether neither more causes nor better fits can bring it close to another set that leaves only noise.
-        """
+        """Say whether neither more causes nor better fits can bring it close to another set that leaves only noise."""
         if other is self or not leaves_only_noise(other.work):
             return False
         per_lost, behind = least_means([self, other]), settings.DECISIVE_NATS

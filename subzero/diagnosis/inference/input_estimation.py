@@ -93,8 +93,7 @@ class LatentForceCandidate:
         return replace(self, fit=fit, columns=columns)
 
     def log_evidence(self, problem: Problem, causes: Ids) -> float:
-        """Return its log evidence in addition to causes, in the linear problem whitened with the noise of a problem.
-        """
+        """Return its log evidence in addition to causes, in the linear problem whitened with the noise of a problem."""
         D = variances(problem.entries, causes, self.kappa)
         data = _seen(self.fit, D, self.columns)
         gain = _log_gain(problem, self.id, data, self.knots, self.terms)
@@ -126,7 +125,8 @@ def latent_force_candidates(
     knots: Knots,
     terms: Mapping[str, Terms] | None = None,
 ) -> list[LatentForceCandidate]:
-    """Return every force and drift of `columns` (id → (m, n)), in the linear problem around a fit, most probable first.
+    """Return every force and drift of `columns` (id → (m, n)), in the linear problem around a fit, most probable
+    first.
 
     Args:
         problem: of the columns.

@@ -12,8 +12,8 @@ push that lasts for some seconds, has one number. So there is a dictionary of fo
     φ(t) = feature(state(t)) · window(t),     window = 1,  [t ≥ t₀],  [t₀ ≤ t < t₁],  Λ(t₀ … t₁),  exp(−t/T);
     or  cos ωt, sin ωt                        (Λ: rising to the middle, and falling)
 
-Features are those of `external_force`, along a fitted track; those that usually act along an axis have a larger prior.
-`one_terms` gives the formulas of one term.
+Features are those of `external_force`, along a fitted track; those that usually act along an axis have a larger
+prior. `one_terms` gives the formulas of one term.
 """
 
 from __future__ import annotations

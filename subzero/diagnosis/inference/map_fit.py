@@ -143,8 +143,7 @@ def bounded_step(
 
 
 def quadratic_step(P: np.ndarray, g: np.ndarray, least: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """Return argmin ½ xᵀPx − gᵀx with least ≤ x ≤ most, by holding entries at bounds and releasing them (active set).
-    """
+    """Return argmin ½ xᵀPx − gᵀx with least ≤ x ≤ most, by holding entries at bounds and releasing them (active set)."""
     x, held = np.zeros_like(g), np.zeros(g.size, dtype=bool)
     for _ in range(20):
         free = ~held
@@ -217,8 +216,7 @@ def with_own_jacobian(problem: Problem, fit: Fit) -> Fit:
 
 
 def continued(problem: Problem, fit: Fit) -> Fit:
-    """Return a fit continued, with sensitivities of its own, while a large gain is predicted and some of it achieved.
-    """
+    """Return a fit continued, with sensitivities of its own, while a large gain is predicted and some of it achieved."""
     for _ in range(settings.MAX_TRIED):
         if fit.predicted_gain < settings.DECISIVE_NATS:
             break
@@ -327,10 +325,10 @@ def restarted_where_smooth(problem: Problem, fit: Fit, ids: Ids, D: np.ndarray |
     low, high = bounds(problem)
     low[at] = high[at] = [settings.RESTART_TOLERANCES * problem.entries[k].parameter.tolerance for k in at]
     z = fit.z + bounded_step(fit.J, fit.r, fit.z, D, low, high)
-    return refit(problem, z, _across_kinks(problem, fit, z, at), D, most_fresh=1)
+    return refit(problem, z, _with_slopes_at_restart(problem, fit, z, at), D, most_fresh=1)
 
 
-def _across_kinks(problem: Problem, fit: Fit, z: np.ndarray, at: list[int]) -> np.ndarray:
+def _with_slopes_at_restart(problem: Problem, fit: Fit, z: np.ndarray, at: list[int]) -> np.ndarray:
     """Return the sensitivities (m, k) of a fit with new ones at z to the non-smooth entries, if z is close to the
     linearisation point of the others; else all of them at z.
     """

@@ -131,8 +131,8 @@ EXCESS_SIGMAS = 6.0
 
 
 def has_moved(entries: Sequence[Entry], z: np.ndarray, kappa: float) -> bool:
-    """Say whether a fit z (k,) is no longer the vehicle that was declared: a number that all records share is more than
-    PRACTICAL_TOLERANCES off, or the widest scale κ of the tolerances is the most probable.
+    """Say whether a fit z (k,) is no longer the vehicle that was declared: a number that all records share is more
+    than PRACTICAL_TOLERANCES off, or the widest scale κ of the tolerances is the most probable.
     """
     shared = [k for k, entry in enumerate(entries) if entry.record < 0]
     sizes = [abs(float(z[k])) / entries[k].parameter.tolerance for k in shared]

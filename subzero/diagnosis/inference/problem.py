@@ -74,8 +74,7 @@ class Observed:
     noise_times: Mapping[str, CorrelationTimes] = field(default_factory=dict)
 
     def corrected(self, more: Mapping[str, np.ndarray]) -> Observed:
-        """Return the record with more added to the correction of the simulation; the measured values are unchanged.
-        """
+        """Return the record with more added to the correction of the simulation; the measured values are unchanged."""
         both = {name: self.correction.get(name, 0.0) + column for name, column in more.items()}
         return replace(self, correction={**self.correction, **both})
 
@@ -190,8 +189,8 @@ class Problem:
     def jacobian(
         self, z: np.ndarray, columns: Sequence[int] | None = None, *, side: float = 1.0
     ) -> np.ndarray:
-        """Return J (m, k) at z by one-sided differences, upwards (1) or downwards (-1) where bounds let them; only some
-        of its columns, if asked, others 0.
+        """Return J (m, k) at z by one-sided differences, upwards (1) or downwards (-1) where bounds let them; only
+        some of its columns, if asked, others 0.
         """
         wanted = range(len(self.entries)) if columns is None else columns
         base = self.tracks([(i, z) for i in range(len(self.records))])
@@ -243,8 +242,8 @@ class Problem:
     def tracks(
         self, jobs: Sequence[tuple[int, np.ndarray]], stops: Sequence[Stop | None] | None = None
     ) -> list[Track]:
-        """Return the track of each (record, z), side by side; none is run twice, and each only from its stop on, where
-        it has one.
+        """Return the track of each (record, z), side by side; none is run twice, and each only from its stop on,
+        where it has one.
         """
         self.kept.count(len(jobs))
         asked = [(i, np.where(self._is_early, z, 0.0)) for i, z in jobs]

@@ -194,8 +194,8 @@ def linear_evidences(
 def _freed_evidence(
     problem: Problem, base: Base, kappa: float, places: np.ndarray, sizes: Sequence[int]
 ) -> np.ndarray:
-    """Return the log evidence (n,) of n hypotheses that free the entries at places (n, p) under a κ, of causes with so
-    many parameters each.
+    """Return the log evidence (n,) of n hypotheses that free the entries at places (n, p) under a κ, of causes with
+    so many parameters each.
     """
     every, bounded = range(len(problem.entries)), (_lowest(problem) == 0.0)[places]
     prior = variances_named(problem.entries, every, kappa)[places]
@@ -228,10 +228,11 @@ def _sweep(
     here: np.ndarray,
     scales: Sequence[float],
 ) -> None:
-    """Simulate sizes of entries about z, in parallel, given the residual `here` at z; keep the best of every cause.
-    """
+    """Simulate sizes of entries about z, in parallel, given the residual `here` at z; keep the best of every cause."""
     names, flat, at_z = nameable(problem.entries), without_slope(problem, J), Quadratic.at(z, here, J)
-    best: dict[Ids, float] = {(problem.entries[k].effect.id,): -np.inf for k in at}  # if no size can be simulated
+    best: dict[Ids, float] = {
+        (problem.entries[k].effect.id,): -np.inf for k in at
+    }  # if no size can be simulated
     for cause in sizes_run(problem, z, here, at, scales):
         ids: Ids = (problem.entries[cause.k].effect.id,)
         value = _evidence_there(problem, _quadratic_of(cause, at_z, J), (), ids) + log_prior(ids, len(names))

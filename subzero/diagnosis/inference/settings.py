@@ -16,8 +16,9 @@ NEGLIGIBLE_GAIN_NATS = 0.1
 CONVERGED_GAIN_NATS = 0.5
 """A fit has converged if its linear model predicts a smaller gain and no step gains anything."""
 CLOSE_NATS = 2.0
-"""Explanations this close to the best may turn out better once they have settled: they are refined, and refitted where
-the linear model predicts this much more."""
+"""Explanations this close to the best may turn out better once they have settled: they are refined, and refitted
+where the linear model predicts this much more.
+"""
 SCAN_GAIN_NATS = 3.0
 """A change point that gains less on the coarse grid of onsets is not scanned on the fine one."""
 FURTHER_CAUSE_NATS = 4.0

@@ -173,8 +173,7 @@ def with_limit(setting: Setting) -> tuple[Setting, Track]:
 
 
 def with_stops(setting: Setting, times: Collection[float]) -> tuple[Track, dict[float, Stop]]:
-    """Return the track of a setting, and the simulation as it was at times [s], or at the last exchange before each.
-    """
+    """Return the track of a setting, and the simulation as it was at times [s], or at the last exchange before each."""
     begin, grid, steps = _prepared(setting)
     done = {time: int(time / setting.trial.cable_step + 1e-6) for time in times}
     stops = _run(setting, begin, grid, steps, set(done.values()))
@@ -242,8 +241,8 @@ def _run(
 
 
 def _exchanges(setting: Setting) -> tuple[np.ndarray, int]:
-    """Return the times of the exchanges (n,), evenly spaced to the end of the trial or beyond [s], and the hull's steps
-    between two of them.
+    """Return the times of the exchanges (n,), evenly spaced to the end of the trial or beyond [s], and the hull's
+    steps between two of them.
     """
     trial = setting.trial
     count = max(1, math.ceil(trial.duration / trial.cable_step - 1e-6))
@@ -392,8 +391,7 @@ class RunCache:
             self.asked += runs
 
     def setting(self, nominal: Setting, entries: Any, z: np.ndarray, make: Callable[[], Setting]) -> Setting:
-        """Return the setting that was made of a nominal setting, entries (by identity of the objects) and deviations.
-        """
+        """Return the setting that was made of a nominal setting, entries (by identity of the objects) and deviations."""
         key, store = (id(nominal), id(entries), z.tobytes()), self._store
         with store.lock:
             found = store.settings.get(key)

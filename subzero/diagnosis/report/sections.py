@@ -14,7 +14,8 @@ from subzero.diagnosis.results import CAUSE_NAMED, OUTSIDE, UNDECIDED, Gain, Mis
 
 
 class Section(NamedTuple):
-    """A part of a report: paragraphs and tables as they follow one another, and the kinds of figures that belong to it.
+    """A part of a report: paragraphs and tables as they follow one another, and the kinds of figures that belong to
+    it.
 
     A section that `is_folded` is for readers who want to know how the verdict was found.
     """

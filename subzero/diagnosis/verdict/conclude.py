@@ -185,9 +185,9 @@ def _explanation(
         first = ranked.change_points[0]
         change = first.change_point
         return first.problem.entries, first.fit.z, (change.effect.id,), change.kappa
-    strange = max(findings.out_of_catalogue, key=lambda each: each.log_posterior, default=None)
-    if strange and strange.point and strange.log_posterior > best.log_posterior:
-        return entries, strange.point.fit.z, best.ids, kappa
+    added = max(findings.out_of_catalogue, key=lambda each: each.log_posterior, default=None)
+    if added and added.point and added.log_posterior > best.log_posterior:
+        return entries, added.point.fit.z, best.ids, kappa
     return entries, best.fit.z, best.ids, kappa
 
 

@@ -130,8 +130,9 @@ SAMPLED = Effect(
     ),
     apply=_sampled,
 )
-"""When in its interval a measurement happened that a logger held, drew lines to, or averaged: any time is as likely, so
-that the variance is 1/12. Each record has its own, never named."""
+"""When in its interval a measurement happened that a logger held, drew lines to, or averaged: any time is as likely,
+so that the variance is 1/12. Each record has its own, never named.
+"""
 
 
 def _turned(key: str) -> Callable[[Setting, float], Setting]:
