@@ -123,7 +123,9 @@ class InnerKernel(Kernel):
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Compile at our level of optimisation, without signals, and without garbage collection, an eighth of the time."""
+    """Compile at our level of optimisation, without signals, and without garbage collection, an eighth of the
+    time.
+    """
     # These settings are global: they are restored even if compiling fails.
     level, collects = numba.config.OPT, gc.isenabled()
     with deferred_signals():

@@ -72,7 +72,9 @@ def sources_of(room: str, file: Path | None = None) -> tuple[Path, ...]:
 
 @cache
 def digest_of(room: str, file: Path | None = None) -> str:
-    """Return twelve hexadecimal digits that change with the sources, as `sources_of`, the compiler and its settings."""
+    """Return twelve hexadecimal digits that change with the sources, as `sources_of`, the compiler and its
+    settings.
+    """
     digest = hashlib.sha256(repr((_compiler(), room)).encode())
     for path in sources_of(room, file):
         # The name counts, too: a module that is renamed is another source.

@@ -216,7 +216,9 @@ def rows_of(problem: Problem) -> _Row:
 
 
 def parts_of(problem: Problem, rows: _Row) -> np.ndarray:
-    """Return the number of the part (m,) in which each row is held out: its record, or its block of the only trial."""
+    """Return the number of the part (m,) in which each row is held out: its record, or its block of the only
+    trial.
+    """
     if len(problem.records) > 1:
         return rows.record
     return (rows.time // BLOCK_S).astype(int) % FOLDS

@@ -150,7 +150,9 @@ Words = Callable[[DataError], str]
 
 
 class Kind(NamedTuple):
-    """A kind of error: its share of all errors, functions that correct and plant it, its description and its remedy."""
+    """A kind of error: its share of all errors, functions that correct and plant it, its description and its
+    remedy.
+    """
 
     share: float
     correct: Change

@@ -69,7 +69,9 @@ def is_flat(entry: Entry, column: np.ndarray) -> bool:
 
 
 def number_of(name: str, setting: Setting) -> float:
-    """Return a number of a setting's vehicle, cable or drum, by its dotted name such as "vehicle.rudder.lift_slope"."""
+    """Return a number of a setting's vehicle, cable or drum, by its dotted name such as
+    "vehicle.rudder.lift_slope".
+    """
     found: Any = setting.model
     for key in name.split("."):
         found = getattr(found, key)

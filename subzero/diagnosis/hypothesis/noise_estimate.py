@@ -165,7 +165,9 @@ def descend(sought: NoiseSearch, point: np.ndarray) -> float:
 
 @compiled
 def _corner(sought: NoiseSearch, point: np.ndarray, moved: int, corner: np.ndarray) -> None:
-    """Fill a corner of the first simplex (3,): the point with one of its numbers moved, reflected at an upper bound."""
+    """Fill a corner of the first simplex (3,): the point with one of its numbers moved, reflected at an upper
+    bound.
+    """
     for i in range(3):
         corner[i] = point[i]
         if i == moved:
@@ -208,7 +210,9 @@ def _is_settled(simplex: np.ndarray, costs: np.ndarray) -> bool:
 
 @compiled
 def _improve(sought: NoiseSearch, simplex: np.ndarray, costs: np.ndarray) -> int:
-    """Replace the worst corner by a better point, or shrink all towards the best; return the number of evaluations."""
+    """Replace the worst corner by a better point, or shrink all towards the best; return the number of
+    evaluations.
+    """
     # Each branch returns its number of evaluations: 1, 2, or 5 with the three corners that shrink.
     first, second = scratch(1, 3)[0], scratch(1, 3)[0]
     reflected = _beyond(sought, simplex, 1.0, first)

@@ -205,7 +205,9 @@ class Explained:
         return {name: total[name] / count for name, count in samples.items() if count}
 
     def is_less_probable(self, other: Explained) -> bool:
-        """Say whether neither more causes nor better fits can bring it close to another set that leaves only noise."""
+        """Say whether neither more causes nor better fits can bring it close to another set that leaves only
+        noise.
+        """
         if other is self or not leaves_only_noise(other.work):
             return False
         per_lost, behind = least_means([self, other]), settings.DECISIVE_NATS
@@ -281,7 +283,9 @@ def log_outlier(record: Observed, name: str) -> float:
 
 
 def _outliers(record: Observed, name: str) -> tuple[int, int, float]:
-    """Return how many samples of a channel are outliers, how many were measured, and the usual level of its sensor."""
+    """Return how many samples of a channel are outliers, how many were measured, and the usual level of its
+    sensor.
+    """
     measured = int(np.isfinite(record.values[name]).sum())
     return measured - record.noise[name].count, measured, sensor_of(record, name).level
 

@@ -93,7 +93,9 @@ class LatentForceCandidate:
         return replace(self, fit=fit, columns=columns)
 
     def log_evidence(self, problem: Problem, causes: Ids) -> float:
-        """Return its log evidence in addition to causes, in the linear problem whitened with the noise of a problem."""
+        """Return its log evidence in addition to causes, in the linear problem whitened with the noise of a
+        problem.
+        """
         D = variances(problem.entries, causes, self.kappa)
         data = _seen(self.fit, D, self.columns)
         gain = _log_gain(problem, self.id, data, self.knots, self.terms)

@@ -243,7 +243,9 @@ def windowed(shape: Shape, times: np.ndarray, edges: np.ndarray) -> list[Shape]:
 
 
 def shifted(shape: Shape, plain: Shape, times: np.ndarray) -> list[Shape]:
-    """Return a windowed shape with its edges moved by less than the grid that they were found on, where it is not 0."""
+    """Return a windowed shape with its edges moved by less than the grid that they were found on, where it is
+    not 0.
+    """
     if shape.start is None or shape.decay:
         return [shape]
     starts = [shape.start + by for by in EDGE_NUDGES_S]
@@ -388,7 +390,9 @@ def one_terms(problem: Problem, z: np.ndarray, knots: Knots) -> Mapping[str, Ter
 def _of_record(
     problem: Problem, z: np.ndarray, knots: Knots, record: int
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return the terms of a record at all knots (n, terms, 2), 0 in other records, and axis → log weights (terms,)."""
+    """Return the terms of a record at all knots (n, terms, 2), 0 in other records, and axis → log weights
+    (terms,).
+    """
     own = knots.record == record
     times = samples_of(float(knots.time[own][-1]))
     shapes = all_shapes(factors_along(problem.setting(record, z), times), times)

@@ -287,7 +287,9 @@ def log_evidence_process(
 
 
 def log_evidence_term(data: ForceInformation, terms: Terms, amplitudes: Sequence[float]) -> float:
-    """Return the log evidence of f = φ c over that of f = 0, c ~ N(0, a² I); terms and amplitudes marginalised over."""
+    """Return the log evidence of f = φ c over that of f = 0, c ~ N(0, a² I); terms and amplitudes
+    marginalised over.
+    """
     first, second = terms.phi[:, :, 0], terms.phi[:, :, 1]
     M1, M2 = data.M @ first, data.M @ second
     m11, m12, m22 = np.sum(first * M1, axis=0), np.sum(first * M2, axis=0), np.sum(second * M2, axis=0)

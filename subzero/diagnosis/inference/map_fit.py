@@ -143,7 +143,9 @@ def bounded_step(
 
 
 def quadratic_step(P: np.ndarray, g: np.ndarray, least: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """Return argmin ½ xᵀPx − gᵀx with least ≤ x ≤ most, by holding entries at bounds and releasing them (active set)."""
+    """Return argmin ½ xᵀPx − gᵀx with least ≤ x ≤ most, by holding entries at bounds and releasing them
+    (active set).
+    """
     x, held = np.zeros_like(g), np.zeros(g.size, dtype=bool)
     for _ in range(20):
         free = ~held
@@ -216,7 +218,9 @@ def with_own_jacobian(problem: Problem, fit: Fit) -> Fit:
 
 
 def continued(problem: Problem, fit: Fit) -> Fit:
-    """Return a fit continued, with sensitivities of its own, while a large gain is predicted and some of it achieved."""
+    """Return a fit continued, with sensitivities of its own, while a large gain is predicted and some of it
+    achieved.
+    """
     for _ in range(settings.MAX_TRIED):
         if fit.predicted_gain < settings.DECISIVE_NATS:
             break

@@ -219,7 +219,9 @@ class Fits:
         return moved == 0.0 or (fit.converged and moved < near)
 
     def _with_slopes(self, J: np.ndarray, ids: Ids) -> np.ndarray:
-        """Return sensitivities with secants for the causes of a hypothesis that have no effect when they are small."""
+        """Return sensitivities with secants for the causes of a hypothesis that have no effect when they are
+        small.
+        """
         J = J.copy()
         for k in columns_of(self.problem.entries, ids):
             if k in self.screen.columns and is_flat(self.problem.entries[k], J[:, k]):

@@ -199,7 +199,9 @@ class Search(Fits):
         self.screen = screening_of(self.problem, self.wide, self.nominal, far=self.is_far)
 
     def first_fits(self) -> None:
-        """Fit nothing, and the best causes and pairs of the screen, by simulations, with the sensitivities at hand."""
+        """Fit nothing, and the best causes and pairs of the screen, by simulations, with the sensitivities at
+        hand.
+        """
         if self.screen.far:
             self.fit_large_effects()
         first = [] if self.screen.far else self._first()

@@ -175,7 +175,9 @@ def is_explained(search: Search, out_of_catalogue: Sequence[OutOfCatalogue]) -> 
 
 
 def _sorted(found: list[OutOfCatalogue], own: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
-    """Return all explanations, the most probable first; of those with two linearisation points the more probable one."""
+    """Return all explanations, the most probable first; of those with two linearisation points the more
+    probable one.
+    """
     kept: dict[tuple[str, Ids], OutOfCatalogue] = {}
     for each in sorted(found + own, key=lambda candidate: -candidate.log_posterior):
         kept.setdefault((each.id, each.causes), each)
@@ -255,7 +257,9 @@ def _bases(search: Search) -> list[Candidate]:
 
 
 def _sudden(search: Search, close: Sequence[RelinearisedForce], known: float) -> list[OutOfCatalogue]:
-    """Return causes with a change point, without other causes, that may be as probable as the best explanation known."""
+    """Return causes with a change point, without other causes, that may be as probable as the best
+    explanation known.
+    """
     problem, effects = search.problem, search.problem.sudden_effects
     if not effects:
         return []

@@ -74,7 +74,9 @@ class Observed:
     noise_times: Mapping[str, CorrelationTimes] = field(default_factory=dict)
 
     def corrected(self, more: Mapping[str, np.ndarray]) -> Observed:
-        """Return the record with more added to the correction of the simulation; the measured values are unchanged."""
+        """Return the record with more added to the correction of the simulation; the measured values are
+        unchanged.
+        """
         both = {name: self.correction.get(name, 0.0) + column for name, column in more.items()}
         return replace(self, correction={**self.correction, **both})
 

@@ -228,7 +228,9 @@ def _sweep(
     here: np.ndarray,
     scales: Sequence[float],
 ) -> None:
-    """Simulate sizes of entries about z, in parallel, given the residual `here` at z; keep the best of every cause."""
+    """Simulate sizes of entries about z, in parallel, given the residual `here` at z; keep the best of every
+    cause.
+    """
     names, flat, at_z = nameable(problem.entries), without_slope(problem, J), Quadratic.at(z, here, J)
     best: dict[Ids, float] = {
         (problem.entries[k].effect.id,): -np.inf for k in at

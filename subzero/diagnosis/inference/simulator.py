@@ -173,7 +173,9 @@ def with_limit(setting: Setting) -> tuple[Setting, Track]:
 
 
 def with_stops(setting: Setting, times: Collection[float]) -> tuple[Track, dict[float, Stop]]:
-    """Return the track of a setting, and the simulation as it was at times [s], or at the last exchange before each."""
+    """Return the track of a setting, and the simulation as it was at times [s], or at the last exchange
+    before each.
+    """
     begin, grid, steps = _prepared(setting)
     done = {time: int(time / setting.trial.cable_step + 1e-6) for time in times}
     stops = _run(setting, begin, grid, steps, set(done.values()))
@@ -391,7 +393,9 @@ class RunCache:
             self.asked += runs
 
     def setting(self, nominal: Setting, entries: Any, z: np.ndarray, make: Callable[[], Setting]) -> Setting:
-        """Return the setting that was made of a nominal setting, entries (by identity of the objects) and deviations."""
+        """Return the setting that was made of a nominal setting, entries (by identity of the objects) and
+        deviations.
+        """
         key, store = (id(nominal), id(entries), z.tobytes()), self._store
         with store.lock:
             found = store.settings.get(key)

@@ -252,7 +252,9 @@ def _effects(
 
 
 def _todays_id(name: str) -> str:
-    """Return the id of an effect with the present name of its channel: ``sensor_bias:roll`` is now ``…:roll_angle``."""
+    """Return the id of an effect with the present name of its channel: ``sensor_bias:roll`` is now
+    ``…:roll_angle``.
+    """
     effect, at, time = name.partition("@")
     kind, colon, channel = effect.partition(":")
     return f"{kind}{colon}{RENAMED_CHANNELS.get(channel, channel)}{at}{time}"

@@ -173,7 +173,9 @@ def _rival(work: Findings, best: Candidate, ids: Ids, p: float) -> Rival:
 
 
 def between(problem: Problem, fit: Fit, ids: Ids, others: Ids) -> float:
-    """Return D of causes as they are in a fit against others; of no cause, D against the others at one effect scale."""
+    """Return D of causes as they are in a fit against others; of no cause, D against the others at one effect
+    scale.
+    """
     if not ids:
         return between(problem, _scaled(problem, fit, others), others, ids) if others else 0.0
     own = columns_of(problem.entries, ids)

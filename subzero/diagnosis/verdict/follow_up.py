@@ -205,7 +205,9 @@ def _with_closest(findings: Findings, known: Ranked, verdict: str, left: Remaini
 
 
 def _gained(findings: Findings, new: Extension, rival: Fit | None) -> Gain:
-    """Return the gain of an extension on held-out data, compared with a refit within tolerances and the best rival."""
+    """Return the gain of an extension on held-out data, compared with a refit within tolerances and the best
+    rival.
+    """
     tolerance = Fitted(findings.problem, findings.search.candidates[()].fit)
     other = Fitted(findings.problem, rival) if rival else None
     nominal = findings.search.nominal[0]
