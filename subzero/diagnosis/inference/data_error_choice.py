@@ -348,7 +348,7 @@ def _holds_one(explanation: Explained, errors: Container[tuple[int, str]]) -> bo
 
 
 def _is_complete(tried: Sequence[Explained]) -> bool:
-    """Say whether nothing was interrupted."""
+    """Say whether no search was interrupted."""
     return all(error.work.complete for error in tried)
 
 

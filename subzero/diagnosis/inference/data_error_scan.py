@@ -69,7 +69,8 @@ HOPELESS = -30.0
 FINEST = 0.02
 """A number is refined to this share of the step of its grid."""
 AS_GOOD = 0.5
-"""The posterior mean of a number is reported in place of the best where that is no more than so much more probable.
+"""The posterior mean of a number is reported instead of the best one where the best is more probable by no more than
+this.
 """
 
 

@@ -1,7 +1,7 @@
 """The search over hypotheses: from linear evidence of all to MAP fits of a few, by adding, dropping and swapping
 causes.
 
-fit with κ = 4 → screening of nothing, all causes, all pairs → fits of the best, and of causes that are better where
+fit with κ = 4 → screening of no cause, all causes, all pairs → fits of the best, and of causes that are better where
 sizes are simulated from the nominal model → best-first refinement → add, drop, swap, or merge two causes of the best,
 until it no longer changes → refit the best and its rivals until they converge
 """
@@ -195,12 +195,12 @@ class Search(Fits):
         self._take(candidate_of(self.problem, other.ids, fit))
 
     def screen_causes(self) -> None:
-        """Screen: linear evidence of nothing, every cause, and every pair."""
+        """Screen: linear evidence of no cause, every cause, and every pair."""
         self.screen = screening_of(self.problem, self.wide, self.nominal, far=self.is_far)
 
     def first_fits(self) -> None:
-        """Fit nothing, and the best causes and pairs of the screen, by simulations, with the sensitivities at
-        hand.
+        """Fit "nothing is wrong" and the best causes and pairs of the screening by simulations, with the
+        sensitivities at hand.
         """
         if self.screen.far:
             self.fit_large_effects()

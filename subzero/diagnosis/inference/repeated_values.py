@@ -300,7 +300,7 @@ def log_odds_of_frozen(steps: Steps, run: np.ndarray) -> float:
         run: which of them repeat a value (n,): the last samples.
     """
     known, first = log_evidence_up_to(steps), int(np.argmax(run))
-    before = np.concatenate([[0.0], known])[first:-1]  # of what comes before each sample of the run
+    before = np.concatenate([[0.0], known])[first:-1]  # of the samples before each one of the run
     return float(log_sum(before - known[-1]) - np.log(steps.time.size))
 
 

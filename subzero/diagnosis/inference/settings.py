@@ -16,7 +16,7 @@ NEGLIGIBLE_GAIN_NATS = 0.1
 CONVERGED_GAIN_NATS = 0.5
 """A fit has converged if its linear model predicts a smaller gain and no step gains anything."""
 CLOSE_NATS = 2.0
-"""Explanations this close to the best may turn out better once they have settled: they are refined, and refitted
+"""Explanations this close to the best may turn out better once they have converged: they are refined, and refitted
 where the linear model predicts this much more.
 """
 SCAN_GAIN_NATS = 3.0
