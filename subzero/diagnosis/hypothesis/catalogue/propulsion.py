@@ -1,4 +1,4 @@
-"""What can be wrong with propeller, motor and battery."""
+"""Effects of propeller, motor and battery."""
 
 from __future__ import annotations
 
@@ -95,4 +95,4 @@ _BY_ID = {effect.id: effect for effect in EFFECTS}
 ONSETS = (
     growing(_BY_ID["propeller_thrust_gain"], "fading_thrust", "the thrust of the propeller fades or grows"),
 )
-"""What grows from some time on."""
+"""Effects that grow from an onset on."""
