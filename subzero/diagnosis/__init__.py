@@ -2,24 +2,24 @@
 
     records + nominal model → residuals → linearisation → evidence of every hypothesis → MAP fits → verdict
 
-Bayesian variable selection on the parameters of a simulator. A hypothesis is a set of causes: their parameters have the
-wide prior N(0, s²), all others the narrow one N(0, (κτ)²). Its evidence is Laplace's, around a MAP fit with real
+Bayesian variable selection on the parameters of a simulator. A hypothesis is a set of causes: their parameters have
+the wide prior N(0, s²), all others the narrow one N(0, (κτ)²). Its evidence is Laplace's, around a MAP fit with real
 simulations, mixed over κ. Change points and latent forces compete with the causes on the same scale.
 
 symbol       name                                                     unit          module
 -----------  -------------------------------------------------------  ------------  --------------------------
 z            deviations of all parameters from the nominal model      their own     hypothesis.effect
 τ, s         prior standard deviations: tolerance, size of an effect  as z          hypothesis.effect
-h(z)         what the sensors would have measured                     channel's     inference.simulator
+h(z)         readings of the sensors in a simulation                  channel's     inference.simulator
 W            whitening by the noise: level, colour, gaps              1             hypothesis.noise
 r, J         whitened residual W (y − h(z)), and ∂(W h)/∂z            1             inference.problem
 κ            scale of all tolerances, mixed over 1, 2, 4              1             inference.linear_gaussian
 D            squared Mahalanobis distance to the closest rival        1             assessment.identifiability
 
-Reading order: `api`, the way in; `results`, the values that come out; then hypothesis, inference, assessment, verdict,
-report. What a user needs has its name here, and comes from its file when it is first used: compiled code imports the
-configuration, and an edit of a report must not compile it again. The engine's parts have faces of their own,
-`subzero.diagnosis.inference` and `subzero.diagnosis.assessment`.
+Reading order: `api`, the entry point; `results`, the values that are returned; then hypothesis, inference,
+assessment, verdict, report. The public names are listed here, and imported from their files when they are first used:
+compiled code imports the configuration, and an edit of a report must not compile it again. The engine's parts have
+interfaces of their own, `subzero.diagnosis.inference` and `subzero.diagnosis.assessment`.
 """
 
 from importlib import import_module
@@ -74,7 +74,7 @@ __all__ = sorted(_HOME)
 
 
 def __getattr__(name: str) -> Any:
-    """Fetch a public name from its file, once."""
+    """Import a public name from its file, once."""
     if name not in _HOME:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'; it has {', '.join(__all__)}")
     file, inner = _HOME[name]

@@ -1,14 +1,14 @@
-"""`subzero.diagnose`: from files or records to a verdict, and the order in which the engine does its parts.
+"""`subzero.diagnose`: from files or records to a verdict, and the order in which the engine runs its parts.
 
     problem → detectability → residuals → model search → out of catalogue → verdict → extended model, gain, next trial
 
-If even wide priors (κ = 4) do not come close to the records, or the first fits are all poor, explanations outside the
-catalogue are asked first: an estimated input force takes the simulation along the records, where linearisation is
-accurate, and a change point that explains them ends the search.
+If even the fit with wide priors (κ = 4) is not close to the records, or the first fits are all poor, explanations
+that are not in the catalogue are tried first: with an estimated input force the simulation follows the records, where
+linearisation is accurate, and a change point that explains them ends the search.
 
-Of records that may have errors in their data there are several findings. The sets of errors that were tried hold one
-another. Told is the largest of them that, with all that hold it, is probable enough to be named; the next larger one
-stands beside the diagnosis as possible, if it is not improbable.
+For records that may have errors in their data there are several findings, one for each set of errors that was tried;
+the sets are nested. The verdict reports the largest set for which the probability of it, or of a larger one, is high
+enough to be named; the next larger set is reported with the diagnosis as possible, if it is not improbable.
 """
 
 from __future__ import annotations
@@ -66,9 +66,9 @@ from subzero.model import Model
 from subzero.records.record import Record
 
 WORTH_TELLING = 0.05
-"""Errors that are less probable are not told beside a diagnosis of the records without them."""
+"""Errors that are less probable are not reported with a diagnosis of the records that leaves them uncorrected."""
 MOST, EVEN = 1.0 - 1e-9, 0.5
-"""No error is more probable than that; nor, if it may not be named, than as not."""
+"""Largest probability of an error; and of one that may not be named."""
 
 BUDGETS = ("screen", "verdict", "full")
 """Linear evidence only; up to the verdict and the extended model; with gain and next trial."""
@@ -95,13 +95,14 @@ def diagnose(
         ('cause_named', ['rudder_lag'])
 
     Args:
-        records: CSV files, folders of them, records in hand, or `Logged` of `read_trials`; several are fitted together.
+        records: CSV files, folders of them, records in memory, or `Logged` of `read_trials`; several are fitted
+            together.
         model: the scenario that was flown (sidecars may name their own), or another nominal model.
         effects: causes of your own besides the catalogue: a Python file with EFFECTS, or the effects.
         commands: "record" or "scenario", if a record's commands may differ from the scenario's.
-        progress: told the fraction that is done, and what is being tried.
-        seed: of everything random.
-        budget: "full", "verdict" without gain and next trial, or "screen" for the first look of a few seconds.
+        progress: called with the fraction that is done, and a description of the current step.
+        seed: of all random numbers.
+        budget: "full", "verdict" without gain and next trial, or "screen" for the screening alone, in a few seconds.
 
     Raises:
         UserError: a record, a sidecar or an effects file cannot be used.
@@ -140,9 +141,9 @@ def diagnose_trials(
     Args:
         records: of one vehicle, each with its trial.
         effects: causes besides the catalogue.
-        progress: told the fraction that is done, and what is being tried.
-        seen: told what the records can show, before they are looked at.
-        seed: of everything random.
+        progress: called with the fraction that is done, and a description of the current step.
+        seen: called with the detectability of causes, before the records are searched.
+        seed: of all random numbers.
         budget: one of BUDGETS.
 
     Raises:
@@ -179,10 +180,10 @@ def _diagnosed(
     seed: int,
     budget: str,
 ) -> Verdict:
-    """Diagnose records whose channels all hold."""
+    """Diagnose records, all of whose channels can be used."""
     started = perf_counter()
     problem = pose(records, effects)
-    with threadpool_limits(limits=1, user_api="blas"):  # runs have the cores; matrices are small
+    with threadpool_limits(limits=1, user_api="blas"):  # simulations use the cores; matrices are small
         suspicion = suspected(problem, records)
         looking = _Looking(
             problem=problem,
@@ -203,8 +204,8 @@ def _diagnosed(
 
 
 def _without_worst_channel(records: Sequence[Logged]) -> tuple[list[Logged], str]:
-    """Return records without the channel that is farthest from its simulation, in levels of its sensor's noise, where a
-    diagnosis breaks; and a sentence that names it.
+    """Return records without the channel that is farthest from its simulation, in levels of its sensor's noise, for a
+    diagnosis that has failed; and a sentence that names the channel.
 
     Raises:
         UserError: there is no other channel in that record.
@@ -232,15 +233,15 @@ def _without_worst_channel(records: Sequence[Logged]) -> tuple[list[Logged], str
 
 @dataclass(kw_only=True, eq=False)
 class _Looking:
-    """Searches records, as they are or with something in them put right: a `DiagnosisSteps`.
+    """The search of records, as they are or with errors in their data corrected: a `DiagnosisSteps`.
 
     Attributes:
         problem: of the records as they are.
         effects: causes besides the catalogue.
-        scanned: how long errors in the data were looked for. [s]
-        most: so many searches there may be.
-        done: so many there were.
-        shown: the share of the work that was told.
+        scanned: duration of the scan for errors in the data. [s]
+        most: largest number of searches.
+        done: number of searches so far.
+        shown: the largest share of the work that was reported.
     """
 
     problem: Problem
@@ -255,12 +256,12 @@ class _Looking:
     shown: float = 0.0
 
     def _report_progress(self, share: float, words: str) -> None:
-        """Tell the progress, which never goes back."""
+        """Report the progress, which never decreases."""
         self.shown = max(self.shown, share)
         self.progress(self.shown, words)
 
     def start(self, records: Sequence[Logged]) -> Findings:
-        """Return how close wide tolerances come to records."""
+        """Return findings with the fit of records within wide tolerances."""
         low, self.done = self.done / self.most, self.done + 1
         search = Search(
             problem=posed_again(self.problem, records, self.effects),
@@ -273,17 +274,19 @@ class _Looking:
         return work
 
     def begin(self, work: Findings, is_hopeless: Callable[[], bool] = lambda: False) -> None:
-        """Have a first look; if it is hopeless, no farther than outside, as what is there may explain records, too."""
+        """Do the first part, the screening; if it is hopeless, stop after explanations that are not in the catalogue,
+        as one of them may still explain the records.
+        """
         _keeping_what_there_is(work, lambda: _first_step(work, is_hopeless))
 
     def finish(self, work: Findings) -> None:
-        """Find the rest."""
+        """Do the remaining part."""
         if work.complete and self.budget != "screen":
             _keeping_what_there_is(work, lambda: _refine(work))
 
 
 def _keeping_what_there_is(findings: Findings, part: Callable[[], None]) -> None:
-    """Do a part; if that is interrupted, keep what there is."""
+    """Do a part; if it is interrupted, keep the results so far."""
     try:
         part()
     except KeyboardInterrupt:
@@ -294,7 +297,7 @@ def _keeping_what_there_is(findings: Findings, part: Callable[[], None]) -> None
 
 @contextmanager
 def _timed(findings: Findings, part: str) -> Iterator[None]:
-    """Keep how long a part takes."""
+    """Record the duration of a part."""
     started = perf_counter()
     yield
     findings.seconds[part] = findings.seconds.get(part, 0.0) + perf_counter() - started
@@ -306,7 +309,7 @@ def _concluded(findings: Findings) -> Verdict:
 
 
 def _fit_wide(findings: Findings, seen: Seen) -> None:
-    """Fit within wide tolerances, measure the misfit, and tell what the records can show."""
+    """Fit within wide tolerances, measure the misfit, and report the detectability of causes."""
     search = findings.search
     with _timed(findings, "screen"):
         search.begin()
@@ -318,7 +321,9 @@ def _fit_wide(findings: Findings, seen: Seen) -> None:
 
 
 def _first_step(findings: Findings, is_hopeless: Callable[[], bool]) -> None:
-    """Screen all hypotheses, fit the best, and look outside where none of them explains the records."""
+    """Screen all hypotheses, fit the best, and try explanations that are not in the catalogue where none of them
+    explains the records.
+    """
     search, explained = findings.search, False
     with _timed(findings, "screen"):
         if search.is_far and findings.budget != "screen":
@@ -345,7 +350,7 @@ def _first_step(findings: Findings, is_hopeless: Callable[[], bool]) -> None:
 
 
 def _refine(findings: Findings) -> None:
-    """Fit until nothing gets better, and look outside again."""
+    """Fit until no fit improves, and try explanations that are not in the catalogue again."""
     search = findings.search
     if not is_explained(search, findings.out_of_catalogue):
         with _timed(findings, "fits"):
@@ -367,14 +372,14 @@ def _search_out_of_catalogue(findings: Findings, share: float, words: str) -> No
 
 
 def _measure_misfit(findings: Findings) -> None:
-    """Set the nominal simulation beside the records, with the noise as it is known by now."""
+    """Compare the nominal simulation with the records, with the noise as it is estimated so far."""
     for record in findings.records:
         findings.misfit[record.name] = misfits(record, respond(record.setting, record.time, record.noise))
 
 
 def _one_explains(findings: Findings) -> bool:
-    """Fit the causes by themselves that come out best in real runs of some sizes, and say whether one of them explains
-    the records, within declared tolerances: then nothing else has to take the run along them.
+    """Fit single causes that are best in simulations of some sizes, and say whether one of them explains the records,
+    within declared tolerances: then no force or change point is needed as a linearisation point.
     """
     findings.search.progress(0.2, "causes of any size")
     findings.search.only_nothing()
@@ -384,7 +389,9 @@ def _one_explains(findings: Findings) -> bool:
 
 
 def _from_afar(findings: Findings) -> None:
-    """Let a force, or a cause that begins in mid-trial, take the run along the records, and look from there."""
+    """Fit a force or a change point, so that the simulation follows the records, and use that fit as the
+    linearisation point.
+    """
     search = findings.search
     search.progress(0.25, "forces, and causes that begin in mid-trial")
     aside = search.set_aside()
@@ -403,13 +410,14 @@ def _on_records(
 
     Args:
         records: as they are.
-        tried: what errors they may have, each set with what explains the records besides and its log evidence.
-        conclude: makes the verdict on records of what was found in them.
+        tried: sets of errors that they may have, each with the explanation of the corrected records and its log
+            evidence.
+        conclude: makes the verdict on records from findings.
     """
     sets = sorted((trial for trial, _ in tried), key=lambda trial: len(trial.errors))
     total, logs = log_sum([log for _, log in tried]), {id(trial): log for trial, log in tried}
     each = np.exp([logs[id(trial)] - total for trial in sets])
-    at_least = np.minimum(np.cumsum(each[::-1])[::-1], MOST)  # of a set, or one that holds it
+    at_least = np.minimum(np.cumsum(each[::-1])[::-1], MOST)  # of a set, or of a larger one
     reported = max((i for i, trial in enumerate(sets) if _is_named(trial, at_least[i])), default=0)
     verdict = conclude(sets[reported].work)
     is_complete = all(trial.work.complete for trial in sets)
@@ -425,7 +433,7 @@ def _on_records(
 
 
 def _is_named(explanation: Explained, probability: float) -> bool:
-    """Say whether errors may be the verdict: they are probable, and without them the records are explained."""
+    """Say whether errors may be the verdict: they are probable, and the records without them are explained."""
     if probability < NAMED_PROBABILITY or not leaves_only_noise(explanation.work):
         return False
     return decided(explanation.work, ranked(explanation.work)) != NOTHING_NEAR
@@ -434,8 +442,8 @@ def _is_named(explanation: Explained, probability: float) -> bool:
 def _with_errors(
     after: Verdict, records: Sequence[Logged], explanation: Explained, probability: float | None
 ) -> Verdict:
-    """Return the verdict `data_error`, which goes on with the diagnosis of the records without the errors; `undecided`
-    where they could not be held against all else (None), as the diagnosis was interrupted.
+    """Return the verdict `data_error`, with the diagnosis of the records without the errors; `undecided` where they
+    could not be compared with all other explanations (None), as the diagnosis was interrupted.
     """
     share = EVEN if probability is None else probability
     errors = _reported(records, explanation.errors, share)
@@ -443,7 +451,9 @@ def _with_errors(
         name: replace(own, recorded=_recorded(records, explanation.errors, name))
         for name, own in after.curves.items()
     }
-    listed = {_beside(explanation.errors, name): share * p for name, p in after.probabilities.items()}
+    listed = {
+        _name_with_errors(explanation.errors, name): share * p for name, p in after.probabilities.items()
+    }
     words = " ".join(f"{error.record}: {error.sentence}: {error.remedy}." for error in errors)
     return replace(
         after,
@@ -471,9 +481,9 @@ def _recorded(
 def _with_possible(
     reported: Verdict, records: Sequence[Logged], less: Explained, more: Explained, probability: float
 ) -> Verdict:
-    """Return a verdict beside which further errors in the data are possible.
+    """Return a verdict with further errors in the data added as possible.
 
-    Errors that would be probable enough, but may not be named, are held to be as probable as not.
+    Errors that would be probable enough, but may not be named, get a probability of at most one half.
     """
     if probability < WORTH_TELLING:
         return reported
@@ -482,7 +492,7 @@ def _with_possible(
     further = [error for error in more.errors if (error.record, error.error.id) not in known]
     errors = _reported(records, further, probability)
     listed = {name: (1.0 - probability) * p for name, p in reported.probabilities.items()}
-    listed[_beside(more.errors, "none")] = probability
+    listed[_name_with_errors(more.errors, "none")] = probability
     words = " and ".join(error.sentence for error in errors)
     rival = Rival(
         ids=tuple(error.id for error in errors),
@@ -490,10 +500,12 @@ def _with_possible(
         probability=probability,
         discrimination=np.nan,
     )
-    drawn = _with_planted(reported.curves, records, more, further, f"rival: {_beside(more.errors, 'none')}")
+    drawn = _with_planted(
+        reported.curves, records, more, further, f"rival: {_name_with_errors(more.errors, 'none')}"
+    )
     rivals = tuple(sorted([*reported.rivals, rival], key=lambda each: -each.probability))
     ranked = dict(sorted(listed.items(), key=lambda pair: -pair[1]))
-    beside = replace(
+    with_rival = replace(
         reported,
         rivals=rivals,
         curves=drawn,
@@ -502,8 +514,8 @@ def _with_possible(
         data_errors=reported.data_errors or errors,
     )
     if probability <= 1.0 - NAMED_PROBABILITY or reported.on_model == NOTHING_NEAR:
-        return beside
-    return replace(beside, then=UNDECIDED) if reported.then else replace(beside, verdict=UNDECIDED)
+        return with_rival
+    return replace(with_rival, then=UNDECIDED) if reported.then else replace(with_rival, verdict=UNDECIDED)
 
 
 def _with_planted(
@@ -513,7 +525,9 @@ def _with_planted(
     further: Sequence[SuspectedError],
     label: str,
 ) -> dict[str, Curves]:
-    """Return record → curves, also what explains the records without further errors, as recorded with these."""
+    """Return record → curves, with the explanation of the records without further errors added, as it would be
+    recorded with these.
+    """
     found, made = dict(shown), curves(more.work.problem, {label: more.work.search.best().fit})
     for i, record in enumerate(records):
         own = made[record.name]
@@ -526,8 +540,8 @@ def _with_planted(
     return found
 
 
-def _beside(found: Sequence[SuspectedError], name: str) -> str:
-    """Return the name of an explanation with errors in the data beside it."""
+def _name_with_errors(found: Sequence[SuspectedError], name: str) -> str:
+    """Return the name of an explanation with errors in the data added to it."""
     ids = dict.fromkeys(trial.error.id for trial in found)
     return " + ".join([*ids, *([] if name == "none" else [name])])
 

@@ -1,9 +1,9 @@
-"""From files to what a diagnosis takes: measured records, each with the trial that it belongs to.
+"""From files to the input of a diagnosis: measured records, each with the trial that it belongs to.
 
-A record is a CSV file of `subzero.records.record`, with or without columns of commands and a file of metadata. All that
-can be wrong with it is said before anything long is begun, in one message for a record.
+A record is a CSV file of `subzero.records.record`, with or without columns of commands and a file of metadata. All
+problems of it are reported before any long computation, in one message for a record.
 
-A comparison (`check_epoch`, `check_against_runs`) asks for less: the epoch, the units and the signs, but neither a
+A comparison (`check_epoch`, `check_against_runs`) requires less: the epoch, the units and the signs, but neither a
 length nor a sampling rate. It has its simulation anyway, so these checks cost nothing.
 """
 
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 Simulated = Callable[[Setting, np.ndarray, Sequence[str]], Mapping[str, np.ndarray]]
-"""(setting, times, channels) → channel → what the sensors would have measured."""
+"""(setting, times, channels) → channel → readings of the sensors."""
 
 
 @checked_arguments
@@ -60,7 +60,7 @@ def read_trials(
     """Read measured records, each with the trial it belongs to.
 
     Args:
-        paths: CSV files, folders of them, or records that are in hand.
+        paths: CSV files, folders of them, or records in memory.
         scenario: the trial of every record whose sidecar does not name one.
         commands: "record" or "scenario", if a record's commands may differ from the scenario's.
         simulated: the nominal simulation; `subzero.diagnosis.inference.simulator.respond` if None.
@@ -83,7 +83,7 @@ def read_trials(
 
 
 def _name_in_hand(at: int, count: int) -> str:
-    """Return the short name of a record that is no file."""
+    """Return the short name of a record that is not from a file."""
     return "record" if count == 1 else f"record {at + 1}"
 
 
@@ -99,7 +99,7 @@ def _files(paths: Sequence[str | Path]) -> list[Path]:
 
 
 def _names(files: Sequence[Path]) -> list[str]:
-    """Return a short name for each file, unlike the others'."""
+    """Return a short name for each file, different from the others'."""
     stems = [file.stem for file in files]
     return [
         stem if stems.count(stem) == 1 else f"{file.parent.name or '.'}/{stem}"
@@ -138,7 +138,7 @@ def _logged(
 
 
 def _channels(record: Record, sidecar: Metadata) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """Return the channels that can be diagnosed, and what was left out."""
+    """Return the channels that can be diagnosed, and notes on those that were left out."""
     values = {channel: column for channel, column in record.values.items() if channel in SPECS}
     others = [
         channel for channel in record.values if channel not in SPECS and channel not in REPORTED_COMMANDS
@@ -163,7 +163,7 @@ def _channels(record: Record, sidecar: Metadata) -> tuple[dict[str, np.ndarray],
 
 
 def _checked(logged: Logged, sidecar: Metadata, simulated: Simulated | None) -> Logged:
-    """Return a record whose channels look like its trial."""
+    """Return a record after checks that its channels look like its trial."""
     nominal = (simulated or _nominal())(logged.setting, logged.record.time, tuple(logged.record.values))
     record = with_heading_of(logged.record, nominal.get(HEADING))
     values = record.values
@@ -183,14 +183,14 @@ def _checked(logged: Logged, sidecar: Metadata, simulated: Simulated | None) -> 
 
 
 def _nominal() -> Simulated:
-    """Return the simulation itself; the compiler comes only with it."""
+    """Return the simulation itself; the compiler is imported only here."""
     from subzero.diagnosis.inference.simulator import respond
 
     return respond
 
 
 def _notes(still: Sequence[str], held: Sequence[str]) -> list[str]:
-    """Say what is left out, and what is hard to tell."""
+    """Return notes on channels that are left out, or that are hard to judge."""
     notes = [f"Left out, for it never changes: {_columns(still)}."] if still else []
     if held:
         notes.append(
@@ -210,7 +210,7 @@ def _refuse(path: str, problems: list[str]) -> None:
 
 
 def check_epoch(record: Record, trial: scenarios.Trial) -> Metadata:
-    """Check before a run that a record was measured in it, and return what its sidecar says.
+    """Check before a simulation that a record was measured in its trial, and return its sidecar.
 
     Raises:
         UserError: it was not, or the sidecar cannot be used.
@@ -236,7 +236,7 @@ def check_against_runs(record: Record, runs: Mapping[str, xr.Dataset], sidecar: 
         simulated = {name: modelled(run, name, record.time) for name in suspects}
         known = {name: values for name, values in suspects.items() if _overlaps(values, simulated[name])}
         found.append(stuck(known, simulated, NOISE) + unit_questions(known, simulated, NOISE))
-    # A cable changes how much, never which unit: what fits the run without one is in the right unit too.
+    # A cable changes sizes, never units: a record that fits the simulation without one is in the right unit, too.
     _refuse_times(record, min(found, key=len, default=[]))
 
 

@@ -26,30 +26,32 @@ NOTHING_WRONG, CALIBRATED, CAUSE_NAMED, UNDECIDED, OUTSIDE, NOTHING_NEAR, DATA_E
 )
 """The seven verdicts."""
 NAMED_FROM, MAX_NAMED = 0.01, 5
-"""What is less probable than that is not said to explain the records as well; so many explanations are named."""
+"""Least probability of an explanation that is named as explaining the records as well; most explanations that are
+named.
+"""
 
 
 def worth_naming(probabilities: Mapping[Name, float]) -> list[Name]:
-    """Return the explanations that words and figures name where nothing is decided, at least two of them."""
+    """Return the explanations that words and figures name in an undecided verdict, at least two of them."""
     ranked = sorted(probabilities, key=lambda name: -probabilities[name])[:MAX_NAMED]
     return ranked[: max(sum(probabilities[name] >= NAMED_FROM for name in ranked), 2)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class FoundError:
-    """An error in the data of a record: what its logger, its file or a person made of it.
+    """An error in the data of a record, made by its logger, its file or a person.
 
     Attributes:
         id: such as "sign:heading", "unit:depth=feet", "late_clock".
         record: its name.
-        columns: that it befalls; "time_s" for a clock.
-        sentence: what is wrong, in words.
+        columns: affected columns; "time_s" for a clock.
+        sentence: description of the error, in words.
         remedy: what to change, in words.
         probability: of it.
-        amount: how large, of what has a number: a delay [s], a rate [1], a step [unit of the column]; else 0.
+        amount: size of an error with a number: a delay [s], a rate [1], a step [unit of the column]; else 0.
         amount_sd: its standard deviation; 0 where it is not known.
-        since: when it begins, of what does. [s]
-        alike: other errors that the record cannot tell from it, in words.
+        since: time from which on it holds, if it begins in mid-trial. [s]
+        alike: other errors that the record cannot distinguish from it, in words.
     """
 
     id: str
@@ -65,12 +67,12 @@ class FoundError:
 
 
 SHOWN_PROBABILITIES = 3
-"""So many hypotheses stand in the overview of a verdict."""
+"""Number of hypotheses in the overview of a verdict."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """A parameter as the records have it.
+    """A parameter as estimated from the records.
 
     Attributes:
         value: as a whole, with the nominal model's part. [unit]
@@ -109,13 +111,13 @@ class Rival:
     """Another explanation.
 
     Attributes:
-        ids: the causes it is made of; empty for "nothing is wrong".
+        ids: its causes; empty for "nothing is wrong".
         sentence: in words.
         probability: of it.
-        discrimination: D between it and what is told, or what is most probable: below 9 the records cannot tell them
-            apart; NaN of that itself, and where it is not known. [-]
+        discrimination: D between it and the reported explanation, or the most probable one: below 9 the records
+            cannot tell them apart; NaN of that one itself, and where it is not known. [-]
         parameters: cause id → name → estimate.
-        extended: the whole model with it, as it was fitted; None where it was not, and of a force or a drift.
+        extended: the whole model with it, as fitted; None where it was not fitted, and of a force or a drift.
     """
 
     ids: tuple[str, ...]
@@ -128,15 +130,15 @@ class Rival:
 
 @dataclass(frozen=True, kw_only=True)
 class Detectability:
-    """What these records could show of a cause, known before they are looked at.
+    """The detectability of a cause in these records, known before they are searched.
 
     Attributes:
         id: the cause.
-        signal: size of what one effect scale does, in noise and tolerances. [-]
-        smallest: the smallest deviation that would have been seen (signal 4), by parameter. [unit]
-        rival: the cause that looks most alike.
+        signal: size of the response to one effect scale, in noise and tolerances. [-]
+        smallest: the smallest detectable deviation (signal 4), by parameter. [unit]
+        rival: the cause with the most similar response.
         discrimination: D against it at one effect scale. [-]
-        cosine: how much alike, 0 to 1.
+        cosine: similarity of the two responses, 0 to 1.
         units: of `smallest`, by parameter; "1" for a share.
     """
 
@@ -160,9 +162,9 @@ class Misfit:
         bias: mean.
         whiteness_p: probability that white noise would be as coloured (Ljung-Box, 25 lags, after whitening).
         command_correlation: command → (lag [s], correlation), the strongest.
-        windows: when the misfit lives: (from, to). [s]
+        windows: times with a significant misfit: (from, to). [s]
         noise_sd: of the channel, estimated.
-        noise_slow, noise_time: standard deviation of its slow part, and how long that lasts [s].
+        noise_slow, noise_time: standard deviation of its slow part, and correlation time of that [s].
         resolution: the step that values are rounded to; 0 for none.
         outliers: samples that are left out.
         gaps: samples that are missing.
@@ -196,7 +198,7 @@ class ChannelGain:
 
 @dataclass(frozen=True, kw_only=True)
 class Gain:
-    """What the extended model explains (`gain`).
+    """The gain of the extended model (`gain`).
 
     Attributes:
         fitted: channel → errors on the data that were fitted.
@@ -217,11 +219,11 @@ class Gain:
 
 @dataclass(frozen=True, kw_only=True)
 class NextTrial:
-    """The trial that would best separate what is left.
+    """The trial that would best separate the remaining explanations.
 
     Attributes:
         name: of the library, or "optimised".
-        sentence: what to do, in words.
+        sentence: instructions, in words.
         decides: expected probability that it decides. [-]
         discrimination: D between the two causes hardest to tell apart, there. [-]
         channel: a channel worth adding, "" if none is needed.
@@ -238,11 +240,11 @@ class NextTrial:
 
 @dataclass(frozen=True, kw_only=True)
 class Extended:
-    """The extended model: deviations from the nominal one (effect id → parameter → deviation), and what else is new.
+    """The extended model: deviations from the nominal one (effect id → parameter → deviation), and other additions.
 
     Attributes:
         deviations: of the named causes.
-        start_times: effect id → when it began. [s]
+        start_times: effect id → onset. [s]
         calibration: deviations within tolerance that the refit found, of all other effects.
         missing: the force that no effect explains.
     """
@@ -254,17 +256,17 @@ class Extended:
 
 
 WAVE = "wave"
-"""In a formula the feature of what swings by itself; others are those of `subzero.external_force`."""
+"""Feature of a formula for an oscillation of its own; the other features are those of `subzero.external_force`."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Unknown:
-    """The force or moment that no cause explains, or the drift of a sensor.
+    """A latent force or moment, or the drift of a sensor.
 
     Attributes:
         axis: X, Y, Z, K, M or N; the channel of a sensor that drifts.
         time: [s]
-        force: body axes; how far the sensor is off. [`unit`]
+        force: in body axes; or the error of the sensor. [`unit`]
         band: its standard deviation. [`unit`]
         formula: terms in words with coefficient and interval: (words, feature, coefficient, low, high).
         features: feature → probability that it belongs to the formula, most probable first.
@@ -290,14 +292,14 @@ class Unknown:
 
 @dataclass(frozen=True, kw_only=True)
 class Curves:
-    """A record and what models say to it, for the figures: name → channel → values at the record's times.
+    """A record and the predictions of models, for the figures: name → channel → values at the record's times.
 
     Attributes:
         time: of the record. [s]
         measured: channel → values, NaN in gaps.
         models: "nominal", "tolerance", "extended", "rival: <ids>" → channel → values.
         used: channel → which samples were used.
-        recorded: channel → times and values as they were before errors in its data were put right.
+        recorded: channel → times and values as they were before errors in its data were corrected.
     """
 
     time: np.ndarray
@@ -314,24 +316,24 @@ class Verdict:
     Attributes:
         verdict: one of the seven.
         sentence: the verdict in words.
-        causes: what is named.
-        rivals: what else the records allow, most probable first; all of it where the records do not decide.
+        causes: those that are named.
+        rivals: other explanations that the records allow, most probable first; all of them in an undecided verdict.
         probabilities: hypothesis ("none", "rudder_lag", "a + b", "unknown_force:X") → probability.
         tolerance_scale: κ → probability that the tolerances are κ times as declared.
-        detectable: what could be seen at all.
+        detectable: smallest detectable sizes of causes.
         misfit: record → channel → how the nominal model fails.
-        gain: what the extended model explains.
-        unknown: the force outside the catalogue.
+        gain: of the extended model, on held-out data.
+        unknown: the latent force or drift.
         extended: the extended model.
-        next_trial: what to do next.
+        next_trial: recommended next trial.
         deviations: parameter → (mean, standard deviation) of the best fit, in tolerances.
         curves: record → curves.
-        notes: what else a reader should know.
-        seconds: how long each part took.
-        seed: of everything random.
+        notes: further remarks for a reader.
+        seconds: duration of each part.
+        seed: of all random numbers.
         complete: False if it was interrupted.
-        data_errors: what is wrong with the data; all else is said of the records without it.
-        then: the verdict on the records without it; "" if nothing is wrong with the data.
+        data_errors: errors in the data; all other fields are about the records without them.
+        then: the verdict on the records without these errors; "" if nothing is wrong with the data.
         unstable: records whose motion is unstable, so that no simulation follows them for long.
     """
 
@@ -359,7 +361,7 @@ class Verdict:
 
     @property
     def on_model(self) -> str:
-        """The verdict on the model: on the records without what is wrong with their data."""
+        """The verdict on the model: on the records without the errors in their data."""
         return self.then or self.verdict
 
     def __repr__(self) -> str:
@@ -371,7 +373,7 @@ class Verdict:
         return self._overview().html()
 
     def _overview(self) -> Overview:
-        """Return the verdict, what is named, what else is probable, what it gains and what to do next."""
+        """Return the verdict, named causes, other probable explanations, the gain and the next trial."""
         rows = [
             ("cause", f"{cause.id}: {cause.sentence} (probability {cause.probability:.3f})")
             for cause in self.causes

@@ -1,6 +1,6 @@
-"""Compile physics, and keep what was compiled: what every package of physics stands on, and nothing else of subzero.
+"""Compile physics, and keep the compiled code: the only part of subzero that the packages of physics use.
 
-name                                            what for                                              file
+name                                            purpose                                               file
 ----------------------------------------------  ----------------------------------------------------  ------------
 compiled, allocating, inner, inlined,
 gated_inlined, by_field                         how a function is compiled                            decorators

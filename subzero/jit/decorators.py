@@ -1,7 +1,7 @@
-"""Compile physics with numba, and keep what was compiled for the next run.
+"""Compile physics with numba, and keep the compiled code for the next run.
 
-The one thing that all packages share: decorators for functions on plain floats and arrays. What they compile is kept
-by `subzero.jit.machine_code`. Setting ``NUMBA_DISABLE_JIT=1`` runs the same code interpreted.
+Decorators for functions on plain floats and arrays, shared by all packages. `subzero.jit.machine_code` keeps the
+code. Setting ``NUMBA_DISABLE_JIT=1`` runs the same code interpreted.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ LEVEL = type(numba.config.OPT)(1)
 def compiled(function: Function) -> Function:
     """Compile a function of plain floats and arrays; strict IEEE arithmetic, so runs repeat to the last bit.
 
-    It borrows the arrays that it is given: it makes none and returns none (`allocating` may). Without counting who
-    holds an array the coupled loop takes two thirds of the time.
+    It borrows its arrays: it makes none and returns none (`allocating` may). Without reference counts of arrays the
+    coupled loop takes two thirds of the time.
 
     A function whose name starts with an underscore is compiled as by `inner`.
     """
@@ -41,7 +41,7 @@ def compiled(function: Function) -> Function:
 
 
 def allocating(function: Function) -> Function:
-    """Compile a function as `compiled` does, that makes arrays or returns some."""
+    """Compile a function that makes or returns arrays, otherwise as `compiled` does."""
     kind = InnerKernel if function.__name__.startswith("_") else Kernel
     return _compile(function, kind, _nrt=True)
 
@@ -52,7 +52,7 @@ def inner(function: Function) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """Compile a function as a part of each that calls it: for what is done at every node, and at every stage of a hull.
+    """Compile a function as a part of each caller: for computations at every node, and at every stage of a hull.
 
     A call passes a `Line` array by array, which takes longer than the arithmetic of a node. The terms of the hull's
     equation, called one by one, take a sixth more.
@@ -61,7 +61,7 @@ def inlined(function: Function) -> Function:
 
 
 def gated_inlined(function: Function) -> Function:
-    """Compile a function as `inlined` does, with a Python wrapper besides: for what Python calls, too."""
+    """Compile a function as `inlined` does, with a Python wrapper: for functions that Python calls, too."""
     return _compile(function, Kernel, forceinline=True)
 
 
@@ -69,6 +69,7 @@ def _compile(function: Function, kind: type[Kernel], **more: bool) -> Function:
     """Return the compiled function; arrays are not counted unless `more` says so."""
     if numba.config.DISABLE_JIT:
         return function
+    # As in numpy, division by 0 gives an infinity; without the GIL, simulations run in threads side by side.
     options = {
         "nopython": True,
         "error_model": "numpy",
@@ -82,15 +83,15 @@ def _compile(function: Function, kind: type[Kernel], **more: bool) -> Function:
 
 
 class Kernel(CPUDispatcher):  # type: ignore[misc]  # numba has no types
-    """A compiled function whose code is kept, and that is compiled once for each kind of arguments.
+    """A compiled function with kept code, compiled once for each combination of argument types.
 
-    By itself, numba compiles a function anew for each number and truth value that stands in a call.
+    numba alone compiles a function again for each literal number and truth value in a call.
     """
 
     machine_code: MachineCode
 
     def enable_caching(self) -> None:
-        """Keep the code where numba's own cache keeps its own."""
+        """Use `MachineCode` instead of numba's own cache."""
         self._cache = self.machine_code = MachineCode(self.py_func)
 
     def compile(self, signature: Any) -> Any:
@@ -99,7 +100,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]  # numba has no types
             return super().compile(signature)
 
     def get_call_template(self, arguments: Any, named: Any) -> Any:
-        """Return how a call in compiled code is typed: by kinds of arguments, not by values."""
+        """Return how a call in compiled code is typed: by types of arguments, not by values."""
         unliteral = numba.types.unliteral
         kinds = {name: unliteral(kind) for name, kind in named.items()}
         return super().get_call_template(tuple(map(unliteral, arguments)), kinds)
@@ -115,13 +116,17 @@ class InnerKernel(Kernel):
         )
 
     def add_overload(self, made: Any) -> None:
-        """Remember what was compiled, but not for calls from Python."""
+        """Remember the compiled code, but not for calls from Python."""
+        # numba would also register the entry point for calls from Python, which this function lacks.
         self.overloads[tuple(made.signature.args)] = made
 
 
 @contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Compile at our level of optimisation, without signals, and without garbage collection, an eighth of the time."""
+    """Compile at our level of optimisation, without signals, and without garbage collection, an eighth of the
+    time.
+    """
+    # These settings are global: they are restored even if compiling fails.
     level, collects = numba.config.OPT, gc.isenabled()
     with deferred_signals():
         numba.config.OPT = LEVEL
@@ -139,7 +144,7 @@ def by_field(
 ) -> Callable[[Line, General], Result]:
     """Return a function (line, c) that is `yes` where the record c has a field, else `no`; only one is compiled.
 
-    What few runs need so does not lengthen the first compilation of all others.
+    So a feature of few simulations does not lengthen the first compilation of all others.
     """
 
     def choose(line, c):  # type: ignore[no-untyped-def]  # numba compares annotations of the two, too

@@ -1,4 +1,4 @@
-"""Keep compiled code for the next run: never of other sources, never damaged, never writable by anybody else.
+"""Keep compiled code for the next run: never of other sources, never damaged, never writable by another user.
 
 The code of one function for one kind of arguments is a file. Its folder is named by a digest of all sources that
 compiled code may be made of (`sources_of`), of the compiler's version and of its settings; whatever changes starts a
@@ -52,20 +52,20 @@ CORE = (
 _announcements: list[Callable[[], None]] = []
 _warned: set[str] = set()
 counting = [False]
-"""Whether a line with the number of compiled functions stands open on standard error."""
+"""Whether a line with the number of compiled functions is unfinished on standard error."""
 _compiled = [0]
 
 
 @cache
 def sources_of(room: str, file: Path | None = None) -> tuple[Path, ...]:
-    """Return the files that the compiled code of a room (``cable``, ``subzero/diagnosis``) may be made of.
+    """Return the files that the compiled code of a package (``cable``, ``subzero/diagnosis``) may depend on.
 
-    A function frozen into machine code has frozen with it other functions and constants of the modules that it
-    imports. By the import contracts these stand in the function's own room or in those of the core.
+    The machine code of a function includes other functions and constants of the modules that it imports. By the
+    import contracts these are in the function's own package or in the core.
 
     Args:
-        room: folder of the function, from the folder of the packages.
-        file: of a function that stands elsewhere; it counts alone with the core.
+        room: folder of the function's package, relative to the root.
+        file: of a function in no package of the product; only this file and the core count.
     """
     folders = {*CORE, room} if file is None else set(CORE)
     inside = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
@@ -74,9 +74,12 @@ def sources_of(room: str, file: Path | None = None) -> tuple[Path, ...]:
 
 @cache
 def digest_of(room: str, file: Path | None = None) -> str:
-    """Return twelve hexadecimal digits that change with the sources, as `sources_of`, the compiler and its settings."""
+    """Return twelve hexadecimal digits that change with the sources, as `sources_of`, the compiler and its
+    settings.
+    """
     digest = hashlib.sha256(repr((_compiler(), room)).encode())
     for path in sources_of(room, file):
+        # The name counts, too: a module that is renamed is another source.
         name = path.relative_to(ROOT) if path.is_relative_to(ROOT) else path
         digest.update(repr((str(name), path.read_bytes())).encode())
     return digest.hexdigest()[:12]
@@ -84,7 +87,7 @@ def digest_of(room: str, file: Path | None = None) -> str:
 
 @cache
 def folder_of(digest: str) -> Path | None:
-    """Return the folder for code, which is made if need be; None if nothing can be kept, which is said once."""
+    """Return the folder for code, which is created if necessary; None, with one warning, if nothing can be kept."""
     base = base_folder()
     if base is None:
         _warn("this user has no home folder")
@@ -119,7 +122,7 @@ def _remove_unused(base: Path) -> None:
 
 
 def base_folder() -> Path | None:
-    """Return the folder that all compiled code is kept in; None if this user has no home."""
+    """Return the folder of all compiled code; None if this user has no home."""
     if chosen := os.environ.get("SUBZERO_CACHE_DIR"):
         return Path(chosen).absolute()
     if os.path.isabs(general := os.environ.get("XDG_CACHE_HOME", "")):
@@ -131,7 +134,7 @@ def base_folder() -> Path | None:
 
 
 def _is_private(folder: Path) -> bool:
-    """Say whether only this user, or root, can have put code there: it is run as it is."""
+    """Say whether only this user, or root, can have written code there: it is executed without further checks."""
     about = folder.stat()
     if not hasattr(os, "geteuid"):  # Windows: a home folder has access rules of its own
         return True
@@ -139,7 +142,8 @@ def _is_private(folder: Path) -> bool:
 
 
 def _compiler() -> tuple[Any, ...]:
-    """Return what compiled code depends on besides its sources and the processor."""
+    """Return the dependencies of compiled code other than its sources and the processor."""
+    # Settings of numba that do not change the machine code.
     no_matter = ("CACHE", "THREAD", "COLOR", "GDB", "CUDA")
     settings = {
         name: value
@@ -150,11 +154,11 @@ def _compiler() -> tuple[Any, ...]:
 
 
 def _warn(why: str) -> None:
-    """Say on standard error, once, that compiled code cannot be kept."""
+    """Warn on standard error, once, that compiled code cannot be kept."""
     if "kept" not in _warned:
         _warned.add("kept")
         line = f"Compiled code is not kept: {why}. Give a folder of your own with SUBZERO_CACHE_DIR."
-        with suppress(OSError, ValueError):  # nothing reads it any more
+        with suppress(OSError, ValueError):  # standard error may be closed
             print(
                 "\n" * counting[0] + line + " This run compiles what it needs (up to a minute).",
                 file=sys.stderr,
@@ -162,7 +166,7 @@ def _warn(why: str) -> None:
 
 
 class MachineCode:
-    """What numba asks for the compiled code of a function, and gives it to: the interface of its own cache.
+    """The kept code of a function, with the interface of numba's own cache.
 
     Args:
         function: as it is written in Python.
@@ -189,19 +193,21 @@ class MachineCode:
         function, folder = self._function, folder_of(self._digest) if self._digest else None
         if folder is None:
             return None
+        # `magic_tuple` has the processor and its features: several machines may share a home folder.
         what = (function.__module__, function.__qualname__, function.__code__.co_firstlineno)
         digest = hashlib.sha256(repr((what, str(signature), codegen.magic_tuple())).encode()).hexdigest()
         return folder / f"{function.__name__[:80]}-{digest[:24]}{SUFFIX}"
 
     def load_overload(self, signature: Any, target_context: Any) -> Any:
-        """Return what was kept for a signature; None if it has to be compiled."""
+        """Return the kept code for a signature; None if it has to be compiled."""
         deliver_pending()
-        rtsys.initialize(target_context)  # what kept code calls
+        rtsys.initialize(target_context)  # the runtime that kept code calls
         file = self.file_for(signature, target_context.codegen())
         if file is not None:
             wait_for(file, deliver_pending)
             if code := _read(file):
                 found = CompileResult._rebuild(target_context, *pickle.loads(code))
+                # A file's name has only a digest of the signature, which might collide with that of others.
                 if found.signature.args == tuple(normalize_signature(signature)[0]):
                     return found
         while _announcements:
@@ -209,7 +215,7 @@ class MachineCode:
         return None
 
     def save_overload(self, signature: Any, data: Any) -> None:
-        """Keep what was compiled for a signature; not what holds addresses of this process."""
+        """Keep the compiled code for a signature; not code that contains addresses of this process."""
         _compiled[0] += 1
         file = self.file_for(signature, data.codegen)
         if (
@@ -221,7 +227,7 @@ class MachineCode:
             _write(file, dumps(data._reduce()))
 
     def enable(self) -> None:
-        """Do nothing: it is always so."""
+        """Do nothing: the cache is always enabled."""
 
     disable = flush = enable
 
@@ -232,13 +238,15 @@ def _read(file: Path) -> bytes | None:
         data = file.read_bytes()
     except OSError:
         return None
+    # The digest includes the file's name: code under another name counts as damaged.
     code = data[32:]
     return code if data[:32] == hashlib.sha256(file.name.encode() + code).digest() else None
 
 
 def _write(file: Path, code: bytes) -> None:
-    """Let a file appear with this code in it, whole."""
+    """Write a file with this code atomically."""
     try:
+        # In the same folder, as a file can be replaced atomically only within a file system.
         handle, unfinished = tempfile.mkstemp(dir=file.parent)
         try:
             with open(handle, "wb") as out:
@@ -258,6 +266,6 @@ def compiled_functions() -> int:
 
 
 def before_compiling(announce: Callable[[], None]) -> None:
-    """Have something said, once, when something has to be compiled."""
+    """Register a function that is called once, before the first compilation."""
     if not _compiled[0]:
         _announcements[:] = [announce]

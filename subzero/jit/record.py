@@ -1,4 +1,4 @@
-"""Numbers as records in memory, which compiled functions take as a single pointer.
+"""Numbers as records in memory, passed to compiled functions as a single pointer.
 
     >>> class Spring(Record):
     ...     stiffness: float
@@ -9,7 +9,8 @@
     >>> spring
     Spring(stiffness=2.0, place=[0. 5. 0.], is_taut=True)
 
-A compiled function takes a named tuple field by field, and a record as one pointer: that halves the first compilation.
+A compiled function takes a named tuple field by field, and a record as one pointer: that halves the first
+compilation.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ import numpy as np
 if TYPE_CHECKING:
 
     class Memory:
-        """What is used here of ``numpy.void``, which is final in numpy's stubs, and only there."""
+        """The part of ``numpy.void`` that is used here; in numpy's stubs, and only there, that class is final."""
 
         base: Any
         dtype: np.dtype[Any]
@@ -40,18 +41,19 @@ else:
 
 @dataclass_transform()
 class Record(Memory):
-    """Numbers, arrays, records and tuples of records in one piece of memory; a class declares them as a dataclass does.
+    """Numbers, arrays, records and tuples of records in one piece of memory; a class declares them as a dataclass
+    does.
 
-    What is put into a record is copied. Fields are read and written by their names; an array among them is a view of
-    the record's memory. Records of a class whose arrays differ in shape or kind differ in layout, and a function is
-    compiled for each layout. Fields that a subclass adds stand before those of its base: so the memory of one is never
-    taken for the memory of the other.
+    Values are copied into a record. Fields are read and written by their names; an array among them is a view of the
+    record's memory. Records of a class whose arrays differ in shape or kind differ in layout, and a function is
+    compiled for each layout. Fields that a subclass adds come before those of its base, so that the two layouts are
+    never mistaken for each other.
 
-    ``numpy.record`` is the same but for a lookup of attributes in Python, through which numba, too, asks for the
-    record's memory: an interrupt in there ends the interpreter.
+    ``numpy.record`` differs by a lookup of attributes in Python, through which numba, too, gets the record's memory:
+    an interrupt during that crashes the interpreter.
 
     Raises:
-        TypeError: an argument too many, too few, or of no such name.
+        TypeError: too many arguments, too few, or an unknown name.
     """
 
     names: ClassVar[tuple[str, ...]] = ()
@@ -61,13 +63,14 @@ class Record(Memory):
     def __init_subclass__(cls) -> None:
         """Read the fields that a class declares."""
         added = [name for name, kind in get_annotations(cls).items() if "ClassVar" not in str(kind)]
+        # An attribute of `numpy.void` would hide a field of the same name.
         taken = [name for name in added if hasattr(np.void, name)]
         if taken:
             raise TypeError(f"{cls.__name__}: every record has {', '.join(taken)} already. Take other names.")
         cls.names = (*added, *cls.names)
         cls.defaults = cls.defaults | {name: cls.__dict__[name] for name in added if name in cls.__dict__}
         for name in cls.defaults.keys() & cls.__dict__.keys():
-            delattr(cls, name)  # else it would be found before the field
+            delattr(cls, name)  # a class attribute would hide the field
 
     def __new__(cls, *values: Any, **named: Any) -> Self:
         """Return a record of these values, by their order or their names."""
@@ -78,6 +81,7 @@ class Record(Memory):
         made_of = (cls, *[kind for _, kind in parts])
         if made_of not in _layouts:
             fields = [(name, _layout(given[name])) for name in cls.names]
+            # With the class as the type of elements, `memory[0]` is an instance of it.
             _layouts[made_of] = np.dtype((cls, fields))
         memory = np.zeros(1, dtype=_layouts[made_of])
         memory[0] = tuple([value for value, _ in parts])
@@ -85,7 +89,7 @@ class Record(Memory):
         return made
 
     def copy(self) -> Self:
-        """Return the same numbers in memory of their own: in a tenth of the time that it takes to make a record."""
+        """Return a copy in memory of its own: in a tenth of the time that it takes to make a record."""
         memory = np.empty(1, dtype=self.dtype)
         memory[0] = self
         same: Self = memory[0]
@@ -97,7 +101,7 @@ class Record(Memory):
         return view
 
     def __iter__(self) -> Iterator[Any]:
-        """Give the values in their order."""
+        """Iterate over the values in their order."""
         return (self[name] for name in self.names)
 
     def __repr__(self) -> str:
@@ -107,7 +111,7 @@ class Record(Memory):
     if not TYPE_CHECKING:  # to a type checker, fields are those that the class declares and no others
 
         def __getattr__(self, name: str) -> Any:
-            """Return a field; what every record has is found before this is asked."""
+            """Return a field; attributes that every record has are found before this is called."""
             try:
                 return self[name]
             except ValueError:
@@ -121,7 +125,7 @@ class Record(Memory):
                 raise AttributeError(self._unknown(name)) from None
 
     def _unknown(self, name: str) -> str:
-        """Return what is wrong with the name of a field."""
+        """Return the message for an unknown field."""
         return f"This record has no field {name!r}; it has {', '.join(self.names)}."
 
 
@@ -129,7 +133,7 @@ Made = TypeVar("Made", bound=Record)
 
 
 def made_once(make: Callable[[], Made]) -> Callable[[], Made]:
-    """Return a function that gives copies of one record: of an empty work space, which is always the same."""
+    """Return a function that returns copies of one record, such as an empty work space."""
     first = cache(make)
 
     @wraps(make)
@@ -140,12 +144,12 @@ def made_once(make: Callable[[], Made]) -> Callable[[], Made]:
 
 
 _layouts: dict[Any, np.dtype[Any]] = {}
-"""What a record is made of → its dtype: always the same one, by which numba knows it at once."""
+"""Types of a record's fields → its dtype: always the same object, which numba recognises at once."""
 
 
 def _read(value: Any) -> tuple[Any, Any]:
-    """Return the value of a field as numpy takes it (rows as lists), and what it is made of."""
-    if type(value) is float:  # most are
+    """Return the value of a field in a form that numpy accepts (rows as lists), and its type."""
+    if type(value) is float:  # the most frequent type
         return value, float
     if isinstance(value, Record):
         return value, value.dtype

@@ -1,12 +1,12 @@
-"""What records can show, how the nominal model fails, what the extended one gains, and what to fly next.
+"""Detectability of causes, misfit of the nominal model, gain of the extended one, and the next trial.
 
-what is computed                                          file
+subject                                                   file
 --------------------------------------------------------  ----------------
 signal of a cause, and D to its closest rival             identifiability
 residuals of the nominal model; gain on held-out data     goodness_of_fit
 the trial that best tells hypotheses apart                next_trial, trial_library
 
-What others may use stands in `__all__` (for what stands outside the diagnosis, a contract holds it).
+`__all__` lists the public names (a contract enforces this for code outside the diagnosis).
 """
 
 from subzero.diagnosis.assessment.goodness_of_fit import (

@@ -1,12 +1,13 @@
-"""How well models predict records: the misfit of the nominal one, channel by channel, the curves of all beside what was
-measured, and what the extended one explains of data that were not fitted: blocks of the same trial, or other trials.
+"""How well models predict records: the misfit of the nominal one, channel by channel; curves of all models and of the
+measurements; and the gain of the extended one on data that were not fitted: blocks of the same trial, or other
+trials.
 
     residual = measured − simulated;   nrmse = rms(W residual);   whiteness by Ljung-Box, 25 lags
     G0 = (E_nominal − E_extended)/(E_nominal − floor),   G1 = (E_tolerance − E_extended)/(E_tolerance − floor)
 
 E is the mean square of the held-out residual, whitened: 1 is the noise alone. The refit without the held-out data is
-that of the linear problem around the fit of all data, so that it takes no run; entries at a bound stay there. A gain
-over the nominal model is mostly owed to tolerances; G1 is what is owed to the new physics.
+that of the linear problem around the fit of all data, so that it takes no simulation; entries at a bound are held
+there. A gain over the nominal model is mostly owed to tolerances; G1 is the part owed to the new physics.
 """
 
 from __future__ import annotations
@@ -29,12 +30,12 @@ if TYPE_CHECKING:
 
 LJUNG_BOX_LAGS = 25
 WINDOW_S = 2.0
-"""Length of the windows in which a misfit is looked for [s]."""
+"""Length of the windows in which a misfit is tested [s]."""
 COMMANDS = ("propeller", "rudder", "port stern-plane", "starboard stern-plane")
 
 
 def misfits(record: Observed, simulated: dict[str, np.ndarray]) -> dict[str, Misfit]:
-    """Return channel → misfit of a record, from what the nominal model says to its times."""
+    """Return channel → misfit of a record, from the prediction of the nominal model at its times."""
     return {name: _misfit(record, name, simulated[name]) for name in record.noise}
 
 
@@ -62,7 +63,7 @@ def _misfit(record: Observed, name: str, simulated: np.ndarray) -> Misfit:
 
 
 def whiteness(white: np.ndarray, lags: int = LJUNG_BOX_LAGS) -> float:
-    """Return the p-value of Ljung and Box: how often white noise would be as coloured."""
+    """Return the p-value of Ljung and Box: the probability that white noise would be as coloured."""
     x = white - np.mean(white)
     n, total = x.size, float(x @ x)
     if n <= lags + 1 or total == 0.0:
@@ -93,7 +94,7 @@ def _correlations(record: Observed, noise: Noise, difference: np.ndarray) -> dic
 
 
 def _windows(time: np.ndarray, residual: np.ndarray, noise: Noise) -> tuple[tuple[float, float], ...]:
-    """Return the times in which the mean residual is more than noise can be, joined."""
+    """Return the windows in which the mean residual is significantly above the noise, joined."""
     found: list[tuple[float, float]] = []
     for begin in np.arange(time[0], time[-1], WINDOW_S):
         own = (time >= begin) & (time < begin + WINDOW_S)
@@ -132,9 +133,9 @@ def _curves(problem: Problem, record: int, fits: Mapping[str, Fit | None]) -> Cu
 
 
 BLOCK_S, FOLDS = 2.0, 5
-"""Length of a block [s], and in how many parts a trial is held out."""
+"""Length of a block [s], and number of parts in which a trial is held out."""
 BOOTSTRAP_DRAWS, LOWER_LEVEL = 1000, 0.05
-"""Of the bootstrap, and its one-sided level: the lower bound is exceeded with 95 %."""
+"""Draws of the bootstrap, and its one-sided level: the lower bound is exceeded with 95 %."""
 AT_BOUND = 1e-9
 BLOCKS, TRIALS = "blocks of the same trial", "other trials"
 
@@ -147,7 +148,7 @@ class Fitted(NamedTuple):
 
 
 class _Row(NamedTuple):
-    """Whose the rows of a residual are: record, channel, and time [s] of each (m,)."""
+    """Origin of the rows of a residual: record, channel, and time [s] of each (m,)."""
 
     record: np.ndarray
     channel: np.ndarray
@@ -157,13 +158,14 @@ class _Row(NamedTuple):
 def gain(
     nominal: np.ndarray, tolerance: Fitted, extended: Fitted, rival: Fitted | None = None, *, seed: int = 0
 ) -> Gain:
-    """Return what an extended model explains.
+    """Return the gain of an extended model.
 
     Args:
-        nominal: residual of the nominal model (m,), white by the noise of the tolerances' refit.
+        nominal: residual of the nominal model (m,), whitened with the noise of the tolerances' refit.
         tolerance: "nothing is wrong", refit within tolerances.
-        extended: what is named, refit; its problem may have a noise of its own, by which all are judged.
-        rival: the best other hypothesis; the tolerances' refit in its place if there is none.
+        extended: the named explanation, refit; its problem may have a noise of its own, which then whitens all
+            residuals.
+        rival: the best other hypothesis; the tolerances' refit is used if there is none.
         seed: of the bootstrap.
     """
     problem = extended.problem
@@ -185,23 +187,24 @@ def gain(
 
 
 def _whitened_anew(model: Fitted, problem: Problem) -> Fitted:
-    """Return a fit of the same samples, white by the noise of another problem."""
+    """Return a fit of the same samples, whitened with the noise of another problem."""
     known = replace(model.problem, records=problem.records)
     return Fitted(known, rewhitened(model.fit, model.problem, known))
 
 
 def share(before: float, after: float, samples: float) -> float:
-    """Return (before − after)/(before − 1) of mean squares: 1 for all that can be explained, below 0 for harm.
+    """Return (before − after)/(before − 1) of mean squares: 1 if everything that can be explained is, below 0 if the
+    error grows.
 
-    What is left may lie below the noise's expected square; then all is explained. Where there was next to nothing to be
-    explained, the denominator is no smaller than the scatter of such squares, so that nothing is claimed.
+    The residual may lie below the noise's expected square; then all is explained. Where there was next to nothing to
+    explain, the denominator is no smaller than the scatter of such squares, so that no gain is claimed.
     """
     scatter = float(np.sqrt(2.0 / samples))
     return float((before - after) / max(before - min(1.0, after), scatter))
 
 
 def rows_of(problem: Problem) -> _Row:
-    """Return whose the rows of a residual are."""
+    """Return the origin of the rows of a residual."""
     record, channel, time = [], [], []
     for i, each in enumerate(problem.records):
         for name, noise in each.noise.items():
@@ -213,7 +216,9 @@ def rows_of(problem: Problem) -> _Row:
 
 
 def parts_of(problem: Problem, rows: _Row) -> np.ndarray:
-    """Return the part (m,) in which each row is held out: its record, or its block of the only trial."""
+    """Return the number of the part (m,) in which each row is held out: its record, or its block of the only
+    trial.
+    """
     if len(problem.records) > 1:
         return rows.record
     return (rows.time // BLOCK_S).astype(int) % FOLDS
@@ -235,7 +240,7 @@ def held_out(model: Fitted, parts: np.ndarray) -> np.ndarray:
 
 
 def _channels(problem: Problem, rows: _Row, residuals: list[np.ndarray]) -> Mapping[str, ChannelGain]:
-    """Return the root mean square of residuals in each channel's unit, beside the noise."""
+    """Return the root mean square of residuals in each channel's unit, with that of the noise."""
     squares = [raw(problem, residual) ** 2 for residual in residuals]
     found = {}
     for name in dict.fromkeys(rows.channel.tolist()):
@@ -249,7 +254,7 @@ def _channels(problem: Problem, rows: _Row, residuals: list[np.ndarray]) -> Mapp
 
 
 def raw(problem: Problem, whitened: np.ndarray) -> np.ndarray:
-    """Return a residual (m,) in the channels' units, of a whitened one."""
+    """Return a whitened residual (m,) in the channels' units."""
     parts, at = [], 0
     for record in problem.records:
         for noise in record.noise.values():
@@ -265,7 +270,7 @@ def _blocks(rows: _Row) -> np.ndarray:
 
 
 def _lower(before: np.ndarray, after: np.ndarray, blocks: np.ndarray, seed: int) -> float:
-    """Return the lower bound of `share` when blocks of squares are drawn again and again."""
+    """Return the lower bound of `share` by a bootstrap of blocks of squares."""
     count = int(blocks.max()) + 1
     sums = [
         np.bincount(blocks, weights=each, minlength=count) for each in (before, after, np.ones_like(before))

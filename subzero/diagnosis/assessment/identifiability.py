@@ -1,10 +1,10 @@
-"""What records can show at all, before they are looked at: signal and discrimination of every cause.
+"""Identifiability before records are searched: signal and discrimination of every cause.
 
     G = information of two causes with all other tolerances free
     signal² = sᵀ G_aa s,    D(a|b) = sᵀ (G_aa − G_ab (G_bb + 1/s_b²)⁻¹ G_ba) s,    D = min over b
 
-D is twice the expected log evidence by which the data prefer a to b: below 9 they cannot be told apart, from 16 on they
-can. A cause of another size v has (v/s)² times as much.
+D is twice the expected log evidence by which the data prefer a to b: below 9 they cannot be distinguished, from 16 on
+they can. A cause of another size v has (v/s)² times as much.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from subzero.diagnosis.inference.problem import Problem
 
 SEEN_SIGNAL = 4.0
-"""A signal that would be seen."""
+"""Least detectable signal."""
 
 
 def with_whole_effects(problem: Problem, J: np.ndarray, z: np.ndarray | None = None) -> np.ndarray:
-    """Return sensitivities at z (the nominal model, if none) with those of a whole effect, beside nothing else, for
-    causes that do nothing when small: they would act in the place of others, not on top of them.
+    """Return sensitivities at z (the nominal model, if none); for causes that have no effect when small, those of a
+    whole effect without any other: they would act instead of others, not in addition to them.
     """
     zero = np.zeros(len(problem.entries))
     here, J = zero if z is None else z, J.copy()
@@ -42,7 +42,7 @@ def with_whole_effects(problem: Problem, J: np.ndarray, z: np.ndarray | None = N
 
 
 def _is_flat(entry: Entry, value: float, column: np.ndarray) -> bool:
-    """Say whether a parameter at its bound seems to do nothing."""
+    """Say whether a parameter at its bound seems to have no effect."""
     parameter = entry.parameter
     at_rest = entry.record < 0 and parameter.low == 0.0 and value < parameter.tolerance
     return at_rest and is_flat(entry, column)
@@ -56,8 +56,8 @@ def marginal(problem: Problem, J: np.ndarray, kappa: float = 1.0) -> np.ndarray:
 
 
 def information(problem: Problem, M: np.ndarray, at: list[int], kappa: float = 1.0) -> np.ndarray:
-    """Return what the data alone say of some entries, all others within tolerance (n, n), from the covariance M of all
-    under the same κ.
+    """Return the information of the data alone on some entries (n, n), all others within tolerance, from the
+    covariance M of all under the same κ.
     """
     tolerance = np.array([kappa * problem.entries[k].parameter.tolerance for k in at])
     return np.linalg.inv(M[np.ix_(at, at)]) - np.diag(1.0 / tolerance**2)
@@ -66,7 +66,7 @@ def information(problem: Problem, M: np.ndarray, at: list[int], kappa: float = 1
 def against(
     problem: Problem, M: np.ndarray, own: list[int], step: np.ndarray, other: list[int], kappa: float = 1.0
 ) -> tuple[float, float]:
-    """Return D of a step (n,) of its own entries against other entries, and how much alike they are (0 to 1)."""
+    """Return D of a step (n,) of its own entries against other entries, and how similar they are (0 to 1)."""
     G = information(problem, M, own + other, kappa)
     n = len(own)
     scale = np.array([problem.entries[k].parameter.scale for k in other])
@@ -78,7 +78,7 @@ def against(
 
 
 def detectability(problem: Problem, J: np.ndarray) -> tuple[Detectability, ...]:
-    """Return what the records can show of every cause, at one effect scale, the weakest first."""
+    """Return the detectability of every cause, at one effect scale, the weakest first."""
     M = marginal(problem, J)
     found = [_of(problem, M, J, each, nameable(problem.entries)) for each in nameable(problem.entries)]
     return tuple(sorted(found, key=lambda each: each.discrimination))
@@ -130,8 +130,8 @@ def separation(
     kappa: float = 1.0,
     refuted: Collection[str] = (),
 ) -> tuple[float, str]:
-    """Return D of causes as they are in z against their closest rival, and that rival ("none": the tolerances), none of
-    those that are `refuted`.
+    """Return D of causes as they are in z against their closest rival, and that rival ("none": the tolerances),
+    without those that are `refuted`.
     """
     M = marginal(problem, J, kappa)
     own = columns_of(problem.entries, ids)

@@ -1,14 +1,15 @@
-"""The trial that best tells apart what the records at hand cannot: of a library, with a further channel, or random.
+"""The trial that best separates explanations that the present records cannot: from a library, with a further channel,
+or random.
 
-    y = h(z_a) + J (z − z_a) + e,   z ~ N(z_a, M_a) of the records at hand,   e ~ N(0, I)
+    y = h(z_a) + J (z − z_a) + e,   z ~ N(z_a, M_a) of the present records,   e ~ N(0, I)
     D(a|b) = dᵀ (I + J M_b Jᵀ)⁻¹ d,   d = h(z_a) − h(z_b);   max over trials of min over pairs of D   (T-optimal)
 
-h(z_a) and h(z_b) are real simulations; J is made once for a trial. Only the directions in which hypotheses and
+h(z_a) and h(z_b) are simulations; J is computed once for a trial. Only the directions in which hypotheses and
 tolerances move the data matter.
 
-Every trial is simulated for every hypothesis; the most promising ones with sensitivities, in the order of the library,
-until one decides for sure (D ≥ AMPLE_DISCRIMINATION). If none does, further channels are looked at; if nothing decides
-at all (D < DECISIVE_DISCRIMINATION), command sequences are drawn at random, within the same limits.
+Every trial is simulated for every hypothesis; those with the largest distances also with sensitivities, in the order
+of the library, until one surely decides (D ≥ AMPLE_DISCRIMINATION). If none does, further channels are tried; if none
+decides at all (D < DECISIVE_DISCRIMINATION), command sequences are drawn at random, within the same limits.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ if TYPE_CHECKING:
 
 
 class Survivor(Protocol):
-    """A hypothesis with its fit, such as `laplace.Candidate`."""
+    """A hypothesis with its fit, such as `map_fit.Candidate`."""
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -59,7 +60,7 @@ class Survivor(Protocol):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Belief:
-    """What the records at hand say: of a trial to come, with its own start.
+    """The posterior given the present records, for a trial to come with its own start.
 
     Attributes:
         z: deviations (k,).
@@ -71,7 +72,7 @@ class Belief:
 
 
 def beliefs(problem: Problem, survivors: Sequence[Survivor]) -> list[Belief]:
-    """Return what each hypothesis says of all that trials share, and of the start of a new one."""
+    """Return the posterior of each hypothesis for all that trials share, and for the start of a new one."""
     shared = [k for k, entry in enumerate(problem.entries) if entry.record < 0]
     start = np.array([parameter.tolerance**2 for effect in START for parameter in effect.parameters])
     found = []
@@ -108,7 +109,7 @@ def prepared_trial(problem: Problem, setting: Setting, channels: Sequence[str] =
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Outlook:
-    """What a trial to come would show, in the directions that matter.
+    """The prediction for a trial to come, in the directions that matter.
 
     Attributes:
         shown: h(z) of each hypothesis (hypotheses, q).
@@ -140,7 +141,7 @@ class Outlook:
             prior: probabilities of the hypotheses (hypotheses,).
             seed: of the draws.
             draws: how many.
-            enough: to be decided.
+            enough: for a decision.
         """
         random, q = np.random.default_rng(seed), self.J.shape[0]
         halves = [np.linalg.cholesky(self.covariance(b)) for b in range(prior.size)]
@@ -163,7 +164,7 @@ def _log_normal(d: np.ndarray, half: np.ndarray) -> np.ndarray:
 
 
 def outlook(shown: np.ndarray, J: np.ndarray, held: Sequence[Belief]) -> Outlook:
-    """Return what h(z) (hypotheses, m) and J (m, k) show, in as few directions as there are.
+    """Return h(z) (hypotheses, m) and J (m, k) projected to as few directions as there are.
 
     The directions are those of J and of the differences between hypotheses.
     """
@@ -175,13 +176,13 @@ def outlook(shown: np.ndarray, J: np.ndarray, held: Sequence[Belief]) -> Outlook
 DECISIVE_DISCRIMINATION = 16.0
 """D from which on a trial decides."""
 AMPLE_DISCRIMINATION = 25.0
-"""D from which on more is no better: the simpler trial is preferred."""
+"""D above which a larger one is no advantage: the simpler trial is preferred."""
 MAX_SIMULATED = 6
-"""How many trials are looked at with sensitivities."""
+"""Most trials that are evaluated with sensitivities."""
 MAX_OPTIMISER_RUNS = 40
-"""Runs of the search for a trial made to measure."""
+"""Simulations of the random search for a trial."""
 MIN_DEPTH_M, MAX_DEEPER_M = 0.2, 5.0
-"""Nothing may rise above this depth, nor sink so much deeper than it starts. [m]"""
+"""Least depth of a safe trial; most that it may sink below its start. [m]"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -193,7 +194,7 @@ class Plan:
         setting: of the trial.
         channel: further channel, "" for none.
         discrimination: the smallest D.
-        view: what it would show; None before sensitivities are made.
+        view: its prediction; None before sensitivities are computed.
     """
 
     name: str
@@ -211,13 +212,13 @@ def next_trial(
     probabilities: Sequence[float] | None = None,
     seed: int = 0,
 ) -> NextTrial | None:
-    """Return what to do next to tell hypotheses apart; None if there are fewer than two.
+    """Return the next trial to tell hypotheses apart; None if there are fewer than two.
 
     Args:
-        problem: of the records at hand.
+        problem: of the present records.
         survivors: hypotheses with their fits, of this problem.
         probabilities: of them; alike if None.
-        seed: of all that is drawn.
+        seed: of the random draws.
     """
     if len(survivors) < 2:
         return None
@@ -236,7 +237,7 @@ def next_trial(
 
 
 def outlooks(problem: Problem, survivors: Sequence[Survivor]) -> list[tuple[str, Outlook]]:
-    """Return what every safe trial of the library would show."""
+    """Return the prediction for every safe trial of the library."""
     held, setting = beliefs(problem, survivors), problem.records[0].setting
     coming = {name: prepared_trial(problem, make(setting)) for name, (_, make) in LIBRARY.items()}
     shown = {name: _shown(each, held) for name, each in coming.items()}
@@ -273,7 +274,7 @@ def _reported(plan: Plan, prior: np.ndarray, seed: int) -> NextTrial:
 def _evaluated(
     problem: Problem, plans: Sequence[Plan], held: Sequence[Belief], most: int = MAX_SIMULATED
 ) -> list[Plan]:
-    """Return the most promising plans that are safe, in their order, up to the first that decides for sure."""
+    """Return the safe plans with the largest distances, in their order, up to the first that surely decides."""
     shown = {plan.name: _shown(prepared_trial(problem, plan.setting), held) for plan in plans}
     apart = {name: _apart(h) for name, h in shown.items() if h is not None}
     names = sorted(apart, key=lambda name: -apart[name])[:most]
@@ -287,7 +288,7 @@ def _evaluated(
 
 
 def _shown(coming: Problem, held: Sequence[Belief]) -> np.ndarray | None:
-    """Return h(z) (hypotheses, m) of a trial; None if a hypothesis leads it out of safe depths."""
+    """Return h(z) (hypotheses, m) of a trial; None if it leaves safe depths under some hypothesis."""
     tracks = coming.tracks([(0, each.z) for each in held])
     if not is_safe(coming, tracks):
         return None
@@ -300,7 +301,7 @@ def _shown(coming: Problem, held: Sequence[Belief]) -> np.ndarray | None:
 
 
 def is_safe(coming: Problem, tracks: Sequence[Track]) -> bool:
-    """Say whether a trial to come stays within safe depths, whatever of some tracks it takes."""
+    """Say whether a trial to come remains within safe depths on all of some tracks."""
     depths = np.stack([track[1][:, 2] for track in tracks])
     start = coming.records[0].setting.trial.start.depth
     return bool(
@@ -317,7 +318,7 @@ def _apart(shown: np.ndarray) -> float:
 
 
 def _viewed(coming: Problem, plan: Plan, shown: np.ndarray, held: Sequence[Belief]) -> Plan:
-    """Return a plan with what it would show."""
+    """Return a plan with its prediction."""
     view = outlook(shown, coming.jacobian(held[0].z), held)
     return Plan(
         name=plan.name,

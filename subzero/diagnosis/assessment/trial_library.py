@@ -1,6 +1,6 @@
-"""Trials worth flying, in one visible table: each makes another setting of the one at hand.
+"""Trials worth flying, in one table: each makes another setting from the present one.
 
-All keep its vehicle, cable and start; commands stay at whole tenths of a second, rudder and stern-planes well within
+All keep its vehicle, cable and start; commands are at whole tenths of a second, rudder and stern-planes well within
 stall, the propeller below what the battery allows. To add one: a function (setting) → setting, and a line in LIBRARY.
 """
 
@@ -197,7 +197,9 @@ LIBRARY: dict[str, tuple[str, Callable[[Setting], Setting]]] = {
     "longer": ("Fly the same trial for twice as long.", longer),
     "rich": ("Fly a minute with doublets of all fins, steps of speed and a coast-down.", rich),
 }
-"""Name → what to do, in words; and what makes it of the trial at hand. Simple ones first: they are preferred."""
+"""Name → instructions, in words; and the function that makes it from the present trial. Simple ones first: they are
+preferred.
+"""
 
 CHANNELS: dict[str, str] = {
     "speed_over_ground": "Log the speed over ground, too.",
@@ -205,4 +207,4 @@ CHANNELS: dict[str, str] = {
     "rudder_angle": "Log the angle of the rudder, too.",
     "propeller_speed": "Log the speed of the propeller, too.",
 }
-"""Channels worth adding → what to do, in words."""
+"""Channels worth adding → instructions, in words."""

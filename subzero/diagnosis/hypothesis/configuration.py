@@ -1,7 +1,7 @@
 """The configuration of a trial is a value, a `Setting`: trial, model and sensors. Effects make new settings from it.
 
-`sensed` is what sensors make of the track of its simulation, without their noise. A record's `surge_speed` is what a
-speed log shows: through the water.
+`sensed` gives the readings of the sensors along the track of its simulation, without their noise. A record's
+`surge_speed` is what a speed log shows: through the water.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ Value = TypeVar("Value")
 
 
 def _changed(value: Value, changes: Mapping[str, Any]) -> Value:
-    """Return a frozen dataclass with some of its fields changed: `dataclasses.replace` for values that check nothing,
-    in a fifth of the time; a diagnosis makes a hundred thousand of them.
+    """Return a frozen dataclass with some of its fields changed: `dataclasses.replace` for values without checks, in
+    a fifth of the time; a diagnosis makes a hundred thousand of them.
     """
     made, own = object.__new__(type(value)), value.__dict__
     made.__dict__.update(own)
@@ -41,7 +41,7 @@ class Sensing:
     """How a sensor's channel differs from what it measures: measured = (1 + scale) × lagged truth + bias.
 
     Attributes:
-        scale: share that is shown too much. [1]
+        scale: relative excess of the reading. [1]
         bias: in the channel's display unit.
         lag: time constant of a first-order delay. [s]
     """
@@ -52,25 +52,25 @@ class Sensing:
 
 
 RIGHT = Sensing()
-"""A sensor that shows what it measures."""
+"""A sensor without error."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """Everything that decides what is measured in a trial, but for the noise.
+    """Everything that determines the measurements of a trial, but for the noise.
 
     Attributes:
         trial: commands, start, steps.
         model: vehicle, cable, drum, water.
-        sensing: channel → how its sensor is wrong; channels without an entry are right.
-        clock_offset: the sensors' clock is late by this: what is logged at t happened at t − offset. [s]
-        intervals: channel → time between two measurements, where a logger filled in what lies between. [s]
-        sampled: such a measurement happened later than it says by this share of its interval: ½ if it is the mean over
-            the interval that begins there, −½ over the one that ends there. [-]
+        sensing: channel → error of its sensor; channels without an entry have none.
+        clock_offset: the sensors' clock is late by this: a sample logged at t was taken at t − offset. [s]
+        intervals: channel → time between two measurements, where a logger filled in the samples between them. [s]
+        sampled: such a measurement was taken later than its time by this share of its interval: ½ if it is the mean
+            over the interval that begins there, −½ over the one that ends there. [-]
         tethered: with the cable.
         later: (time [s], model) from which on another model holds, in the order of time.
-        most_work: iterations of the cable's solver times nodes that a run may take for an exchange, on average; None if
-            it may take any.
+        most_work: limit of the iterations of the cable's solver times nodes for an exchange of a simulation, on
+            average; None for no limit.
     """
 
     trial: scenarios.Trial
@@ -84,7 +84,7 @@ class Setting:
     most_work: float | None = None
 
     def happened(self, times: np.ndarray, channel: str) -> np.ndarray:
-        """Return when what a channel's log says of some times (n,) happened. [s]"""
+        """Return the true times of a channel's measurements that are logged at some times (n,). [s]"""
         return times - self.clock_offset + self.sampled * self.intervals.get(channel, 0.0)
 
     def with_vehicle(self, **changes: float | Callable[[float], float]) -> Setting:
@@ -120,19 +120,20 @@ class Setting:
 
 
 RUDDER, VOLTAGE, TENSION, LENGTH, WATER = (STATE_SIZE + i for i in range(5))
-"""Columns of a track behind the state: rudder [rad], battery [V], tension at the tow point [N], wet length [m], and the
-velocity of the water in earth axes (three). [m/s]"""
+"""Columns of a track after the state: rudder [rad], battery [V], tension at the tow point [N], wet length [m], and
+the velocity of the water in earth axes (three). [m/s]
+"""
 COLUMNS = STATE_SIZE + 7
 
 
 def truth(setting: Setting, track: np.ndarray, channel: str) -> np.ndarray:
-    """Return what is true of a channel along a setting's track (n,); a heading as it is counted from the start."""
+    """Return the true values of a channel along a setting's track (n,); a heading as it is counted from the start."""
     found = TRUTHS[channel](track)
     return turned(found, DEGREE * setting.trial.start.heading) if channel == HEADING else found
 
 
 def sensed(sensor: Sensing | None, grid: np.ndarray, truth: np.ndarray) -> np.ndarray:
-    """Return what a sensor makes of the truth on an even grid."""
+    """Return the readings of a sensor from the true values on an even grid."""
     if sensor is None:
         return truth
     lagged = _lagged(truth, sensor.lag / (grid[1] - grid[0])) if sensor.lag > 0.0 else truth
@@ -148,7 +149,7 @@ def _lagged(truth: np.ndarray, lag: float) -> np.ndarray:
 
 @compiled
 def follow(values: np.ndarray, lag: float) -> None:
-    """Put in the place of values (n,) what follows them with a first-order delay; the lag in samples."""
+    """Replace values (n,) by a first-order delay of them; the lag in samples."""
     keep = np.exp(-1.0 / lag)
     old, new = lag * (1.0 - keep) - keep, 1.0 - lag * (1.0 - keep)
     before = values[0]
@@ -214,4 +215,4 @@ TRUTHS: Mapping[str, Callable[[np.ndarray], np.ndarray]] = {
     "cable_tension": _column(TENSION),
     "cable_length": _column(LENGTH),
 }
-"""Channel → what is true of it, from a track, in its display unit; a heading but for whole turns."""
+"""Channel → its true values from a track, in its display unit; a heading but for whole turns."""

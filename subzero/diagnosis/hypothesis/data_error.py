@@ -1,6 +1,6 @@
-"""Errors in the data: what a logger, a file or a person made of a record that a sensor measured rightly.
+"""Errors in the data, made by a logger, a file or a person in a record that a sensor measured correctly.
 
-Each is a transformation of the record, or of the commands that are said to have been given, and so needs no physics:
+Each is a transformation of the record, or of the recorded commands, and so needs no physics:
 
     sign, unit, reference        y = ±x, a x, a₀ ± x of a channel (a compass that is turned, or counts the other way)
     step                         y = x + a from a time on
@@ -14,7 +14,7 @@ Each is a transformation of the record, or of the commands that are said to have
 compared as they were written, so that y = a x costs log|a| a sample (`DataError.log_jacobian`).
 
 An offset of the clock within its `LEAST`, a first-order lag, a bias or a scale of a sensor are causes of the
-catalogue and no errors in the data: they have any size, errors in the data are discrete, or large.
+catalogue and no errors in the data: they may have any size, errors in the data are discrete, or large.
 """
 
 from __future__ import annotations
@@ -36,8 +36,9 @@ from subzero.records.consistency import MISTAKEN, REPORTED_COMMANDS
 from subzero.records.record import Record
 
 LEAST = {"late_clock": 1.5, "latency": 1.0, "clock_rate": 0.01}
-"""Smaller delays are the catalogue's: three of its scales of a clock [s], five of a lag [s]; a clock that is wrong by
-less than that share is a good one."""
+"""Smaller delays belong to the catalogue: three of its scales of a clock [s], five of a lag [s]; a clock rate with a
+smaller error is a good one.
+"""
 
 REFERENCES: dict[str, tuple[float, float]] = {
     "is 90 degrees too large": (90.0, 1.0),
@@ -47,7 +48,7 @@ REFERENCES: dict[str, tuple[float, float]] = {
     "counts counter-clockwise from south": (180.0, -1.0),
     "counts counter-clockwise from west": (270.0, -1.0),
 }
-"""How a compass is told wrongly → (a₀, b): it shows a₀ + b × heading. Counter-clockwise from north is the sign."""
+"""A wrong reference of a compass → (a₀, b): it shows a₀ + b × heading. Counter-clockwise from north is the sign."""
 
 COMMANDS = tuple(REPORTED_COMMANDS)
 PLANES = COMMANDS[2:]
@@ -57,14 +58,14 @@ COMMAND_GROUPS: dict[str, tuple[str, ...]] = {
     "stern_plane_port": PLANES[:1],
     "stern_plane_starboard": PLANES[1:],
 }
-"""Whose sign may be the other one."""
+"""Channels whose sign may be wrong."""
 SWAPS: tuple[tuple[str, str], ...] = (
     ("rudder", "stern_plane_port"),
     ("rudder", "stern_plane_starboard"),
     ("rudder", "stern_planes"),
     ("stern_plane_port", "stern_plane_starboard"),
 )
-"""Whose columns may be exchanged; of both planes the port one's stands for both."""
+"""Channels whose columns may be exchanged; for both planes the port one stands for both."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,10 +74,10 @@ class DataError:
 
     Attributes:
         kind: a row of `KINDS`.
-        channels: that it befalls; of a clock none, of commands groups of `COMMAND_GROUPS`.
-        how: which of several: a unit of `MISTAKEN`, a row of `REFERENCES`; "" where there is one only.
+        channels: affected channels; none for a clock, groups of `COMMAND_GROUPS` for commands.
+        how: which variant: a unit of `MISTAKEN`, a row of `REFERENCES`; "" where there is only one.
         amount: of a step [unit of the channel], a delay [s] or a rate [1].
-        since: when it begins. [s]
+        since: time from which on it holds. [s]
         at: samples that hold no measurement, by their times; of frozen values and drop-outs. [s]
         amount_sd: standard deviation of the amount; 0 where it is not known.
     """
@@ -97,22 +98,22 @@ class DataError:
 
     @property
     def numbers(self) -> int:
-        """How many of its numbers are fitted to a record: its size, and when it begins."""
+        """How many of its numbers are fitted to a record: its size, and its onset."""
         return 2 if self.kind == "step" else int(self.amount != 0.0)
 
     @property
     def is_of_commands(self) -> bool:
-        """It is an error of what was commanded, not of what was measured."""
+        """It is an error of the commands, not of the measurements."""
         return self.kind in ("command_sign", "command_swap")
 
     @property
     def is_of_clock(self) -> bool:
-        """It befalls the times of all channels."""
+        """It affects the times of all channels."""
         return self.kind in ("late_clock", "clock_rate")
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The columns of the record that it befalls."""
+        """The columns of the record that it affects."""
         if self.is_of_commands:
             return tuple(BY_NAME[error].column for group in self.channels for error in COMMAND_GROUPS[group])
         return tuple(BY_NAME[channel].column for channel in self.channels) or ("time_s",)
@@ -136,11 +137,11 @@ class DataError:
         return KINDS[self.kind].plant(self, logged)
 
     def sentence(self) -> str:
-        """Return what is wrong, in words."""
+        """Return a description of the error, in words."""
         return KINDS[self.kind].sentence(self)
 
     def remedy(self) -> str:
-        """Return what to change, in words."""
+        """Return the remedy, in words."""
         return KINDS[self.kind].remedy(self)
 
 
@@ -149,7 +150,9 @@ Words = Callable[[DataError], str]
 
 
 class Kind(NamedTuple):
-    """A kind of error: how much of all errors it is, how to undo it and make it, what to say of it and what to do."""
+    """A kind of error: its share of all errors, functions that correct and plant it, its description and its
+    remedy.
+    """
 
     share: float
     correct: Change
@@ -171,12 +174,14 @@ def _with(logged: Logged, time: np.ndarray | None = None, **values: np.ndarray) 
 
 
 def unturned(heading: np.ndarray) -> np.ndarray:
-    """Return a heading (n,) without the whole turns that it was given to stand beside a run: from within ±180 on."""
+    """Return a heading (n,) without the whole turns that were added to compare it with a simulation: its first value
+    is within ±180.
+    """
     return turned(heading, 0.0)
 
 
 def _values(change: Callable[[DataError, np.ndarray, np.ndarray], np.ndarray]) -> Change:
-    """Return the change of a record whose one channel's values change: (error, time, values) → values."""
+    """Return a change of a record that changes the values of one channel: (error, time, values) → values."""
 
     def changed(error: DataError, logged: Logged) -> Logged:
         (channel,) = error.channels
@@ -221,7 +226,7 @@ def _with_step(error: DataError, time: np.ndarray, values: np.ndarray) -> np.nda
 
 
 def _among(error: DataError, time: np.ndarray) -> np.ndarray:
-    """Say which samples hold no measurement (n,)."""
+    """Say which samples are no measurements (n,)."""
     return np.isin(np.round(time, 6), np.round(np.array(error.at), 6))
 
 
@@ -230,7 +235,9 @@ def _as_gaps(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarr
 
 
 def _repeated(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return values that repeat the last measured one, or with `how` a number are that, where nothing is measured."""
+    """Return values that, where nothing is measured, repeat the last measured one, or are the number `how` if it is
+    given.
+    """
     lost, found = _among(error, time), values.copy()
     for k in np.flatnonzero(lost):
         found[k] = float(error.how) if error.how else found[k - 1] if k else values[0]
@@ -254,7 +261,7 @@ def _inside(logged: Logged, time: np.ndarray) -> Logged:
 
 
 def _steps(logged: Logged, channels: Iterable[str]) -> dict[str, float]:
-    """Return channel → step between its values, of all that there are: samples are to be put outside the trial."""
+    """Return channel → step between its values, from all samples: some are about to be put outside the trial."""
     values = logged.record.values
     shown = {
         name: sensor_prior(name, values[name], logged.noise, logged.steps).resolution for name in channels
@@ -305,7 +312,7 @@ def _delayed(error: DataError, logged: Logged) -> Logged:
 
 
 def _in_time(error: DataError, logged: Logged) -> Logged:
-    """Return a record whose one channel has times of its own, earlier by the delay; all others have gaps there."""
+    """Return a record in which one channel has times of its own, earlier by the delay; all others have gaps there."""
     (channel,) = error.channels
     record, own = logged.record, logged.record.time - error.amount
     inside = (own >= -1e-9) & (own <= logged.setting.trial.duration + 1e-9)
@@ -365,7 +372,7 @@ def _groups(error: DataError) -> str:
 
 
 def _spans(times: tuple[float, ...]) -> str:
-    """Return how many samples these are, and from when to when."""
+    """Return the number of these samples, and their first and last time, in words."""
     return f"{len(times)} samples between {times[0]:g} and {times[-1]:g} s" if times else "no sample"
 
 
@@ -497,16 +504,16 @@ KINDS: Mapping[str, Kind] = {
         lambda suspect: "exchange these columns of the commands",
     ),
 }
-"""Kind → what it is; shares sum to one."""
+"""Kind → its definition; shares sum to one."""
 
 REPEATED = ("frozen", "dropout")
 """Kinds that are read off a record as it was written."""
 ANY = 0.1
-"""How probable it is beforehand that a record has an error in its data."""
+"""Prior probability that a record has an error in its data."""
 
 
 def corrected(logged: Logged, errors: tuple[DataError, ...]) -> Logged:
-    """Return a record without some errors, undone in turn; first what stands at the times that were written."""
+    """Return a record without some errors, corrected in turn; those at the times that were written first."""
     for error in sorted(errors, key=lambda each: each.kind not in REPEATED):
         logged = error.corrected(logged)
     return logged
@@ -515,12 +522,12 @@ def corrected(logged: Logged, errors: tuple[DataError, ...]) -> Logged:
 SHIFTS = ("late_clock", "clock_rate", "latency")
 """Kinds that put samples outside the trial."""
 NUMBERED = (*SHIFTS, "step")
-"""Kinds with a number that is found."""
+"""Kinds with a number that is estimated."""
 
 
 def places(logged: Logged, errors: Iterable[DataError]) -> dict[str, np.ndarray]:
-    """Return channel → which of the samples that were written stands where without some errors (n,); NaN where none
-    does, as a clock puts it outside the trial, or it is no measurement.
+    """Return channel → index of the written sample at each place without some errors (n,); NaN where there is none,
+    as a clock puts it outside the trial, or it is no measurement.
     """
     count = np.arange(logged.record.time.size, dtype=float)
     written = dataclasses.replace(logged.record, values=dict.fromkeys(logged.record.values, count))

@@ -1,4 +1,5 @@
-"""An effect as data: an id, a sentence, its parameters, and how it changes a setting; throughout, or from an onset on.
+"""An effect as data: an id, a sentence, its parameters, and how it changes a setting; throughout, or from an onset
+on.
 
 θ = θ₀ + z                                          throughout; z = 0 is the nominal model, exactly
 θ(t) = θ₀ for t < t₀,   θ₀ + z from t₀ on           with an onset: a fin struck at 12 s, the cable caught at 20 s
@@ -33,13 +34,13 @@ class Parameter:
     Attributes:
         name: short, such as "time_constant".
         unit: as it is shown; "1" for a share.
-        tolerance: τ, how far a healthy vehicle may be from its nominal model (one standard deviation). [unit]
-        scale: s, how far when something is wrong (one standard deviation). [unit]
-        low, high: deviations that make sense. [unit]
-        nominal: what the nominal model has, so that the value can be named as a whole. [unit]
+        tolerance: τ, deviation of a healthy vehicle from its nominal model (one standard deviation). [unit]
+        scale: s, deviation when something is wrong (one standard deviation). [unit]
+        low, high: bounds of possible deviations. [unit]
+        nominal: value in the nominal model, so that the whole value can be reported. [unit]
         step: of a sensitivity, if not a share of the tolerance. [unit]
         least: the whole value cannot be less, or not less than the nominal model's if that is less already. [unit]
-        begins: nothing is any different before this time of the trial. [s]
+        begins: time of the trial before which it changes nothing. [s]
         also_of: another effect that can do the same: a jammed rudder's angle is also an offset.
     """
 
@@ -67,12 +68,12 @@ class Effect:
 
     Attributes:
         id: such as "rudder_lag" or "sensor_bias:heading".
-        sentence: what is wrong, in words: "the rudder servo lags".
+        sentence: its description in words: "the rudder servo lags".
         slot: where it acts: hull, propulsion, fins, cable, drum, water, start, sensors, clock.
         parameters: one or two.
-        apply: what it does to a setting.
+        apply: changes a setting.
         sudden: it can begin in the middle of a trial ("<id>@t").
-        channel: the only channel that it can be seen in, for effects of a sensor.
+        channel: the only channel that it changes, for effects of a sensor.
         grows: id of the effect that grows from an onset on; its deviations are per minute then. "" for none.
     """
 
@@ -87,15 +88,17 @@ class Effect:
 
 
 MINUTE_S = 60.0
-"""Growth is told per minute. [s]"""
+"""Growth is reported per minute. [s]"""
 USUAL_GROWTH_S = 15.0
-"""What grows usually reaches the size of a usual effect in about this time. [s]"""
+"""A growing effect usually reaches the size of a usual effect in about this time. [s]"""
 GROWTH_STEP_S = 1.0
-"""A model that grows changes so often: 0.1 s in its place moves no channel of fig6 by a twentieth of its noise. [s]"""
+"""Interval between changes of a growing model: with 0.1 s instead no channel of fig6 changes by a twentieth of its
+noise. [s]
+"""
 
 
 def growing(effect: Effect, id: str, sentence: str) -> Effect:
-    """Return the effect as it grows in proportion to the time from an onset on; its deviations are per minute."""
+    """Return the effect that grows in proportion to the time since an onset; its deviations are per minute."""
     faster = MINUTE_S / USUAL_GROWTH_S
     rates = tuple(
         replace(
@@ -117,20 +120,22 @@ def growing(effect: Effect, id: str, sentence: str) -> Effect:
 
 
 def _within_bounds(effect: Effect, setting: Setting, *deviations: float) -> Setting:
-    """Return a setting with deviations of an effect that have grown, as far as they make sense."""
+    """Return a setting with deviations of an effect that have grown, limited to their bounds."""
     values = (min(max(z, p.low), p.high) for z, p in zip(deviations, effect.parameters, strict=True))
     return effect.apply(setting, *values)
 
 
 MIN_MARGIN_S, ONSET_STEP_S = 1.0, 0.4
-"""Nothing begins closer to the ends of a record; step of the sensitivity to the time: whole steps of the cable. [s]"""
+"""Least distance of an onset from the ends of a record; step of the sensitivity to the onset: whole steps of the
+cable. [s]
+"""
 ONSET_LINEAR_WITHIN_S = 0.5
-"""Sensitivities hold as long as the time moves less than this. [s]"""
+"""Sensitivities hold while the onset moves by less than this. [s]"""
 
 
 @checked_arguments
 def with_onset(effect: Effect, time: float) -> Effect:
-    """Return the effect as it begins at a time [s]: id "<id>@<time>". To be applied after all that hold throughout."""
+    """Return the effect with an onset [s]: id "<id>@<time>". To be applied after all that hold throughout."""
     return replace(
         effect,
         id=f"{effect.id}@{time:g}",
@@ -141,14 +146,14 @@ def with_onset(effect: Effect, time: float) -> Effect:
 
 
 def plain_id(name: str) -> str:
-    """Return the id of an effect without the time at which it begins: ``hull_drag@12`` → hull_drag."""
+    """Return the id of an effect without its onset: ``hull_drag@12`` → hull_drag."""
     return name.partition("@")[0]
 
 
 @checked_arguments
 def with_free_onset(effect: Effect, time: float, end: float) -> Effect:
-    """Return the effect as it begins at about a time [s] of a trial until `end`: when exactly is its last parameter, as
-    likely at any time.
+    """Return the effect with an onset near a time [s] of a trial until `end`: the onset is its last parameter, with a
+    uniform prior.
     """
     begins = Parameter(
         name="start_time",
@@ -168,9 +173,9 @@ def _from_about(effect: Effect, time: float, setting: Setting, *deviations: floa
 
 
 def _from_then_on(effect: Effect, time: float, setting: Setting, *deviations: float) -> Setting:
-    """Return a setting that has an effect from a time on, beside all other changes in mid-trial.
+    """Return a setting that has an effect from a time on, added to all other changes in mid-trial.
 
-    Models change between two exchanges only: in the one that the effect begins in, it has the share that is left.
+    Models change between two exchanges only: in the exchange that the effect begins in, it has the remaining share.
     """
     if effect.grows:
         return _growing_from(effect, time, setting, *deviations)
@@ -192,10 +197,10 @@ def _from_then_on(effect: Effect, time: float, setting: Setting, *deviations: fl
 
 
 def _growing_from(effect: Effect, time: float, setting: Setting, *rates: float) -> Setting:
-    """Return a setting in which an effect grows from a time on, beside all other changes in mid-trial.
+    """Return a setting in which an effect grows from a time on, added to all other changes in mid-trial.
 
-    In each interval between two changes the model has the mean of what has grown by then, which keeps the order of a
-    run whose models change in steps, and makes it smooth in the onset.
+    In each interval between two changes the model has the mean of what has grown by then, which keeps the order of
+    accuracy of a simulation whose models change in steps, and makes it smooth in the onset.
     """
     exchange, end = setting.trial.cable_step, setting.trial.duration
     step = exchange * max(round(GROWTH_STEP_S / exchange), 1)

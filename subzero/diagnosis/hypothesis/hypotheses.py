@@ -1,8 +1,8 @@
-"""The parameter vector z, the hypotheses about it, and their prior probabilities in one visible table.
+"""The parameter vector z, the hypotheses about it, and a table of their prior probabilities.
 
-z holds the parameters of all effects, which all records share, and then the start of each record. A hypothesis is a set
-of causes, whose entries get the prior variance s² instead of (κτ)². With its numbers, by name, it is an extended model,
-and `apply_extended` makes a setting of that.
+z holds the parameters of all effects, which all records share, and then the start of each record. A hypothesis is a
+set of causes, whose entries get the prior variance s² instead of (κτ)². With its numbers, by name, it is an extended
+model, and `apply_extended` makes a setting of that.
 """
 
 from __future__ import annotations
@@ -60,16 +60,18 @@ def grouped(entries: tuple[Entry, ...]) -> list[tuple[Effect, list[int], int]]:
 
 
 FLAT_SIGNAL = 1.0
-"""A parameter that does no more than this at one effect scale, in noise levels, has no slope there."""
+"""A parameter whose response to one effect scale is no larger than this, in noise levels, has no slope there."""
 
 
 def is_flat(entry: Entry, column: np.ndarray) -> bool:
-    """Say whether whitened sensitivities to an entry (m,) are none."""
+    """Say whether whitened sensitivities to an entry (m,) are negligible."""
     return bool(np.linalg.norm(column) * entry.parameter.scale <= FLAT_SIGNAL)
 
 
 def number_of(name: str, setting: Setting) -> float:
-    """Return a number of a setting's vehicle, cable or drum, by its dotted name such as "vehicle.rudder.lift_slope"."""
+    """Return a number of a setting's vehicle, cable or drum, by its dotted name such as
+    "vehicle.rudder.lift_slope".
+    """
     found: Any = setting.model
     for key in name.split("."):
         found = getattr(found, key)
@@ -79,8 +81,8 @@ def number_of(name: str, setting: Setting) -> float:
 def with_tolerances(effect: Effect, setting: Setting) -> Effect:
     """Return an effect with the tolerances that the files of a setting's vehicle, cable or trial declare.
 
-    A parameter that moves a number by dv/dz may move it by the tolerance that is declared, τ / |dv/dz|; of several such
-    numbers the one that is least allowed counts. Where nothing is declared the tolerance of the catalogue holds.
+    A parameter that moves a number by dv/dz may move it by the tolerance that is declared, τ / |dv/dz|; of several
+    such numbers the most restrictive one counts. Where none is declared the tolerance of the catalogue holds.
     """
     declared = setting.trial.tolerances
     if not declared:
@@ -94,14 +96,14 @@ def with_tolerances(effect: Effect, setting: Setting) -> Effect:
 
 
 def _slope(effect: Effect, at: int, setting: Setting, name: str) -> float:
-    """Return by how much a parameter of an effect moves a number, over its deviation."""
+    """Return the change of a number by a parameter of an effect, over the parameter's deviation."""
     z = small_deviation(effect.parameters[at])
     moved = _moved(effect, at, setting)
     return abs(number_of(name, moved) - number_of(name, setting)) / abs(z)
 
 
 def small_deviation(parameter: Parameter) -> float:
-    """Return a deviation as large as the tolerance, on the side that is possible."""
+    """Return a deviation as large as the tolerance, to a side within bounds."""
     return parameter.tolerance if parameter.tolerance <= parameter.high else -parameter.tolerance
 
 
@@ -114,7 +116,7 @@ def _moved(effect: Effect, at: int, setting: Setting) -> Setting:
 
 
 def moves_nothing(effect: Effect, setting: Setting) -> bool:
-    """Say whether an effect is none in a setting: a share of a number that is zero there."""
+    """Say whether an effect changes nothing in a setting: a share of a number that is zero there."""
     moved = [_moved(effect, at, setting) for at in range(len(effect.parameters))]
     return all(_same(each, setting) for each in moved)
 
@@ -127,16 +129,17 @@ def _same(setting: Setting, other: Setting) -> bool:
 
 
 Ids = tuple[str, ...]
-"""The causes of a hypothesis, in the order of the alphabet; () is "nothing is wrong"."""
+"""The causes of a hypothesis, in alphabetical order; () is "nothing is wrong"."""
 
 _ODDS = {"none": 0.50, "single": 0.40, "pair": 0.06, "unknown": 0.04, "sudden": 0.04, "more": 0.004}
 PRIOR = {kind: odds / sum(_ODDS.values()) for kind, odds in _ODDS.items()}
 """Probability of each kind, shared by all hypotheses of the kind; they sum to one."""
 PRACTICAL_TOLERANCES, PRACTICAL_TOLERANCES_SUDDEN = 4.0, 2.0
-"""A deviation within so many tolerances is a matter of calibration, and no cause; calibration changes nothing in the
-middle of a trial, so that half of it is one there. [κτ]"""
+"""A deviation within so many tolerances is calibration, and no cause; calibration does not change in mid-trial, so
+that half of it is a cause there. [κτ]
+"""
 MAX_CAUSES = 3
-"""Most causes of a hypothesis; "more" are as many."""
+"""Most causes of a hypothesis; the prior "more" is for this number."""
 
 
 def nameable(entries: Sequence[Entry]) -> list[str]:
@@ -146,7 +149,7 @@ def nameable(entries: Sequence[Entry]) -> list[str]:
 
 
 def columns_of(entries: Sequence[Entry], ids: Ids) -> list[int]:
-    """Return where the parameters of causes stand in z."""
+    """Return the places of the parameters of causes in z."""
     return [k for k, entry in enumerate(entries) if entry.record < 0 and entry.effect.id in ids]
 
 
@@ -156,7 +159,7 @@ def pairs_of(entries: Sequence[Entry], ids: Sequence[str]) -> list[Ids]:
 
 
 def log_prior(ids: Ids, count: int) -> float:
-    """Return the log of a hypothesis' probability beforehand, of `count` causes that can be named."""
+    """Return the log prior of a hypothesis, given `count` causes that can be named."""
     if not ids:
         return float(np.log(PRIOR["none"]))
     if len(ids) == 1:
@@ -202,13 +205,15 @@ def apply_extended(extended: Extended, setting: Setting, effects: Mapping[str, E
 
 
 def starts_of(extended: Extended) -> dict[str, float]:
-    """Return when causes that began in mid-trial began, whether their id says it or `start_times`. [s]"""
+    """Return the onsets of causes that began in mid-trial, from their ids or from `start_times`. [s]"""
     said = {name: float(name.partition("@")[2]) for name in extended.deviations if "@" in name}
     return said | {name: start for name, start in extended.start_times.items() if name in extended.deviations}
 
 
 def _with_later(setting: Setting, effect: Effect, numbers: Mapping[str, float], start: float) -> Setting:
-    """Return a setting in which an effect begins in mid-trial, after all changes that are there. [s]"""
+    """Return a setting in which an effect begins in mid-trial, after all changes that are there already; onset in
+    [s].
+    """
     step = setting.trial.cable_step
     if effect.grows:
         return with_onset(effect, start).apply(setting, *_values(effect, numbers))
@@ -220,12 +225,12 @@ def _with_later(setting: Setting, effect: Effect, numbers: Mapping[str, float], 
 
 @checked_arguments
 def unseen(extended: Extended, effects: Mapping[str, Effect]) -> list[str]:
-    """Return the named causes of sensors and their clock, which change what is shown and not what is."""
+    """Return the named causes of sensors and their clock, which change readings and not the motion."""
     return [name for name in extended.deviations if effects[plain_id(name)].slot in ("sensors", "clock")]
 
 
 def _with(setting: Setting, effect: Effect, numbers: Mapping[str, float]) -> Setting:
-    """Return a setting with an effect; parameters that are not named stay as they are."""
+    """Return a setting with an effect; parameters that are not named are unchanged."""
     return effect.apply(setting, *_values(effect, numbers))
 
 

@@ -1,6 +1,8 @@
-"""What a diagnosis takes: a record with the configuration that it was measured in; `read_trials` makes it from files.
+"""The input of a diagnosis: a record with the configuration that it was measured in; `read_trials` makes it from
+files.
 
-Apart from the configuration, which compiled code is made of, so that an edit of how records are read compiles nothing.
+In a file apart from the configuration, which compiled code depends on, so that an edit of the reading of records
+compiles nothing.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.records.record import Record
 
 NO_RECORD = "No measured record is given. Give the path of a CSV file, or of a folder of them."
-"""What is wrong where a diagnosis or a calibration is given nothing."""
+"""Message of a diagnosis or a calibration without a record."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,9 +26,9 @@ class Logged:
         setting: the trial with its commands, and the nominal model.
         noise: channel → standard deviation, where it is known. [display unit]
         name: short, for figures and tables.
-        notes: what was left out, and why.
-        trusted: channels that the user has said are right as they are.
-        steps: channel → step between its values, where more of them show it than are left. [display unit]
+        notes: channels that were left out, and why.
+        trusted: channels that the user has declared to be free of errors.
+        steps: channel → step between its values, where it was read off more samples than are left. [display unit]
     """
 
     record: Record

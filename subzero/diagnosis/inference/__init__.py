@@ -1,10 +1,10 @@
 """Which explanations fit the records, and how probable each is: from the noise of a channel to model averaging.
 
-what is computed                                          file
+subject                                                   file
 --------------------------------------------------------  -----------------
 parameter vector z, its prior, prior of hypotheses        ../hypothesis/hypotheses
 noise of a channel, whitening                             ../hypothesis/noise
-its estimate behind a fit                                 ../hypothesis/noise_estimate
+its estimate from the residual of a fit               ../hypothesis/noise_estimate
 h(z): what the sensors would have measured                ../hypothesis/configuration
 one simulation, from its start or from a stop             simulator
 r(z) and J of all records                                 problem
@@ -20,7 +20,7 @@ onsets, fitted                                            change_point_fit
 a force or a drift over time, and shapes of a formula     latent_force
 its evidence and its history                              input_estimation
 a formula for a latent force                              force_formula
-change points, forces and drifts beside the hypotheses    out_of_catalogue
+change points, forces and drifts added to hypotheses      out_of_catalogue
 values that a record repeats in place of measurements     repeated_values
 what physics may do with a record, its linear evidence    data_error_saturated_model
 errors in the data, proposed by linear evidence           data_error_scan
@@ -30,11 +30,11 @@ errors in the data, suspected together                    data_error_search
 ... and held against all else                             data_error_choice
 all that only steers the search                           settings
 
-What others may use stands in `__all__`; everything else is the engine's own (a contract in ``pyproject.toml`` holds
-it for what stands outside the diagnosis).
+`__all__` lists the public names; everything else is internal to the engine (a contract in ``pyproject.toml`` enforces
+this for code outside the diagnosis).
 """
 
-# ruff: noqa: I001 - in the order in which they stand on one another, not in that of the alphabet
+# ruff: noqa: I001 - in the order of dependence, not alphabetical
 
 from subzero.diagnosis.hypothesis.data_error import (
     KINDS as KINDS_OF_DATA_ERRORS,

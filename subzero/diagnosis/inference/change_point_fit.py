@@ -1,10 +1,11 @@
-"""Change points, fitted: how probable a cause is that begins in mid-trial, with its onset as a parameter.
+"""Change points, fitted: the log posterior of a cause that begins in mid-trial, with its onset as a parameter.
 
     z ~ N(0, κ² τ²),   size ~ N(0, s²),   p(t₀) = 1/T          log p = −objective − ½ log det (D P)
 
-Where much is wrong from some time on, a model without it has to deviate from its priors, and the linearisation there
-says little. With an estimated input force the simulation follows the true trajectory: there every candidate is scanned,
-the best are fitted, and the others tried again around the best fit, until none is left that might be better.
+Where a large change begins at some time, a model without it has to deviate from its priors, and a linearisation there
+is inaccurate. With an estimated input force the simulation follows the true trajectory: around it every candidate is
+scanned, the best ones are fitted, and the others are scanned again around the best fit, until no candidate is left
+that might be better.
 """
 
 from __future__ import annotations
@@ -53,12 +54,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FittedChangePoint:
-    """A sudden cause with a fit of its own.
+    """A cause with a change point, with a fit of its own.
 
     Attributes:
-        change_point: what and when, as fitted.
-        log_posterior: of it beside nothing, but for its own prior.
-        problem: with its parameters and its time behind the entries.
+        change_point: effect, onset and record, as fitted.
+        log_posterior: with no other cause, but for the prior of the change point itself.
+        problem: with its parameters and its onset appended to the entries.
         fit: of that problem.
     """
 
@@ -73,7 +74,7 @@ class FittedChangePoint:
         return self.change_point.id
 
     def linear(self, problem: Problem) -> tuple[Linear, np.ndarray]:
-        """Return the linear problem around its fit, and the prior variances of all its parameters (k,)."""
+        """Return the linear problem around this fit, and the prior variances of all its parameters (k,)."""
         fit = self.fit
         return Linear(fit.r + fit.J @ fit.z, fit.J), _prior(problem, self.problem, self.change_point.kappa)
 
@@ -87,16 +88,16 @@ def fit_change_points(
     side: Executor,
     large: Sequence[Candidate] = (),
 ) -> list[FittedChangePoint]:
-    """Return the sudden causes that are worth a fit of their own, fitted.
+    """Return the causes with a change point that are worth a fit, fitted.
 
     Args:
         problem: records and parameters.
-        points: where they are tried at first.
+        points: linearisation points of the first scan.
         able: effects that may begin in mid-trial.
         record: in which they begin.
-        least: log posterior of what is known else, on the scale of `FittedChangePoint`.
-        side: for fits side by side.
-        large: hypotheses whose causes are tried as large as they are there.
+        least: log posterior of the best other explanation, on the scale of `FittedChangePoint`.
+        side: executor for fits in parallel.
+        large: hypotheses whose causes are also tried at their full size.
     """
     done: dict[str, FittedChangePoint] = {}
     candidates = [candidate for point in points for candidate in ranked_in(problem, point, able, record)]
@@ -119,8 +120,9 @@ def fit_change_points(
 def _worth(
     candidates: Sequence[RankedChangePoint], done: dict[str, FittedChangePoint], least: float
 ) -> list[RankedChangePoint]:
-    """Return what is worth a fit: each cause where it comes out best, if it gains anything there, may come close to
-    the best, known or hoped for, and is promised more than what is known of it.
+    """Return the candidates that are worth a fit: each cause at the linearisation point where it ranks best, if it
+    gains anything there, may come close to the best log posterior (fitted or predicted), and is predicted to gain
+    more than any fit of it so far.
     """
     ranked = sorted(candidates, key=lambda candidate: -candidate.log_posterior)
     first = {candidate.change_point.effect.id: candidate for candidate in reversed(ranked)}
@@ -143,7 +145,7 @@ def _worth(
 
 
 def _fitted(problem: Problem, candidate: RankedChangePoint) -> FittedChangePoint:
-    """Return a sudden cause fitted by real runs, all else within declared tolerances."""
+    """Return a cause with a change point, fitted by simulations, all other parameters within declared tolerances."""
     point, change_point = candidate.point, candidate.change_point
     more, n = with_change_point(problem, change_point), len(problem.entries)
     start = _begin(problem, more, candidate) if candidate.start is None else candidate.start
@@ -156,8 +158,8 @@ def _fitted(problem: Problem, candidate: RankedChangePoint) -> FittedChangePoint
 
 
 def as_fitted(problem: Problem, more: Problem, change_point: ChangePoint, fit: Fit) -> FittedChangePoint:
-    """Return a sudden cause with its fit, in the problem with its parameters behind those of another, and its evidence,
-    mixed over κ.
+    """Return a cause with a change point, with its fit in `more` (the problem with its parameters appended), and its
+    evidence, mixed over κ.
     """
     n, under = len(problem.entries), {kappa: _prior(problem, more, kappa) for kappa in KAPPAS}
     log = laplace(more.entries, fit, under, [range(n, fit.z.size - 1)], PRACTICAL_TOLERANCES_SUDDEN)
@@ -174,7 +176,7 @@ def as_fitted(problem: Problem, more: Problem, change_point: ChangePoint, fit: F
 
 
 def _begin(problem: Problem, more: Problem, candidate: RankedChangePoint) -> np.ndarray:
-    """Return the best deviations in the linear problem of a place with a sudden cause."""
+    """Return the best deviations in the linear problem at a linearisation point with a change point added."""
     fit, change_point, D = candidate.point.fit, candidate.change_point, _prior(problem, more, 1.0)[:-1]
     (C,) = change_point_columns(
         candidate.point.along, [(change_point.effect, change_point.time)], change_point.record
@@ -185,13 +187,13 @@ def _begin(problem: Problem, more: Problem, candidate: RankedChangePoint) -> np.
 
 
 def _prior(problem: Problem, more: Problem, kappa: float) -> np.ndarray:
-    """Return the prior variances of a problem's entries and of the sudden cause behind them."""
+    """Return the prior variances of a problem's entries and of the cause with a change point appended to them."""
     own = [entry.parameter.scale**2 for entry in more.entries[len(problem.entries) :]]
     return np.concatenate([variances(problem.entries, (), kappa), own])
 
 
 def linearised_at(problem: Problem, fitted: FittedChangePoint) -> LinearisationPoint:
-    """Return the linear problem around a sudden cause's fit, of all but it."""
+    """Return the linear problem around the fit of a change point, of all parameters but its own."""
     n, fit = len(problem.entries), fitted.fit
     r = fit.r + fit.J[:, n:-1] @ fit.z[n:-1]
     without = replace(fit, z=fit.z[:n], r=r, J=fit.J[:, :n], D=fit.D[:n], made_at=None)

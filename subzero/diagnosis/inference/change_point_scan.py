@@ -1,8 +1,8 @@
-"""Change-point candidates, ranked by linear evidence before any is fitted: which cause, and from when on?
+"""Change-point candidates, ranked by linear evidence before any is fitted: which cause, and which onset?
 
 Every effect that may begin in mid-trial is tried from every time of a grid, in the linear problem at a linearisation
 point with all tolerances free; the best one again on a finer grid. Causes of a hypothesis are tried by real
-simulations, as large as they are there. What is left out: effects that end again, and two with different onsets.
+simulations, as large as they are there. Not modelled: effects that end again, and two with different onsets.
 """
 
 from __future__ import annotations
@@ -41,22 +41,22 @@ if TYPE_CHECKING:
     from subzero.diagnosis.inference.problem import Observed, Problem
 
 COARSE_ONSETS, FINE_PER_COARSE, MIN_ONSET_SPACING_S = 15, 4, 1.0
-"""A record has so many steps of times to begin at, each so many finer ones, but none is shorter than the last. [s]"""
+"""Number of steps of the coarse grid of onsets in a record; of fine steps in a coarse one; the shortest step. [s]"""
 SECANT_SCALES = 0.25
 """Step of a sensitivity, in effect scales."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ChangePoint:
-    """A sudden effect in the linear problem.
+    """An effect with a change point, in the linear problem.
 
     Attributes:
         effect: as it holds throughout.
-        time: when it begins. [s]
-        record: in which record; a sudden effect is an event of one trial.
-        log_gain: log evidence over that of no such effect.
+        time: its onset. [s]
+        record: in which record; a change point is an event of one trial.
+        log_gain: log evidence over that without the effect.
         mean: deviations of its parameters. [their unit]
-        between: what a time between those that were tried may gain more.
+        between: what an onset between those that were tried may gain more.
         kappa: the most probable scale of the tolerances.
     """
 
@@ -70,7 +70,7 @@ class ChangePoint:
 
     @property
     def with_onset(self) -> Effect:
-        """The effect as it begins at that time."""
+        """The effect with that onset."""
         return with_onset(self.effect, self.time)
 
     @property
@@ -80,19 +80,19 @@ class ChangePoint:
 
 
 Begun = tuple[Effect, float]
-"""An effect, and when it begins. [s]"""
+"""An effect, and its onset. [s]"""
 
 
 class BaseRun(NamedTuple):
-    """A run to take sensitivities from: of a problem with deviations z of all its entries."""
+    """A simulation to take sensitivities from: of a problem with deviations z of all its entries."""
 
     problem: Problem
     z: np.ndarray
 
 
 class LinearisationPoint(NamedTuple):
-    """A linear problem of all that holds throughout, and the run that sensitivities are taken from; what the run has
-    besides (a force, a sudden cause) is part of what the records show.
+    """A linear problem of all parameters that hold throughout, and the simulation that sensitivities are taken from;
+    a force or a change point that the simulation has in addition is part of the linearisation.
     """
 
     fit: Fit
@@ -100,12 +100,12 @@ class LinearisationPoint(NamedTuple):
 
 
 def spacing_of(problem: Problem, record: int) -> float:
-    """Return the steps of the times to begin at. [s]"""
+    """Return the spacing of the grid of onsets. [s]"""
     return max(float(problem.records[record].time[-1]) / COARSE_ONSETS, MIN_ONSET_SPACING_S)
 
 
 def times_of(problem: Problem, record: int) -> list[float]:
-    """Return times to begin at: a grid within a record, without its ends. [s]"""
+    """Return the onsets that are tried: a grid within a record, without its ends. [s]"""
     spacing = spacing_of(problem, record)
     return [
         float(time)
@@ -121,13 +121,13 @@ def scan(
     *,
     best: int = 3,
 ) -> list[ChangePoint]:
-    """Return every sudden effect at its best time, most probable first; the `best` of them with finer times around
-    those of the grid that come out about as well: a jam that begins between two commands has several peaks.
+    """Return every effect with a change point at its best onset, most probable first; the `best` of them on a finer
+    grid around each peak of about the same height: a jam that begins between two commands has several peaks.
 
     Args:
         point: close to the data.
         D: prior variances of the entries (k,).
-        effects: of the catalogue; those that are not sudden are left out.
+        effects: of the catalogue; those that cannot begin in mid-trial are left out.
         record: in which they begin.
         best: how many are tried on the finer grid.
     """
@@ -145,7 +145,7 @@ def scan(
 
 
 def _peaks(best: ChangePoint, found: list[ChangePoint]) -> list[float]:
-    """Return the times of a grid at which an effect comes out about as well as at its best one, that one first."""
+    """Return the onsets of a grid at which an effect gains about as much as at the best one, the best one first."""
     least = best.log_gain - settings.LINEAR_NATS
     alike = [
         candidate
@@ -158,12 +158,12 @@ def _peaks(best: ChangePoint, found: list[ChangePoint]) -> list[float]:
 
 
 def in_rough_steps(along: BaseRun) -> BaseRun:
-    """Return a run in rougher steps, which serves to look for onsets."""
+    """Return a simulation in coarser steps, accurate enough to scan for onsets."""
     return along._replace(problem=along.problem.roughly(along.z))
 
 
 def onset_columns(along: BaseRun, effects: Sequence[Effect], record: int) -> dict[Begun, np.ndarray]:
-    """Return whitened sensitivities (m, parameters) to every sudden effect from every time of a grid on."""
+    """Return whitened sensitivities (m, parameters) to every effect that begins at each onset of a grid."""
     able = [effect for effect in effects if effect.sudden]
     coarse = times_of(along.problem, record)
     steps = [(candidate, time) for candidate in able if not candidate.grows for time in coarse]
@@ -176,11 +176,11 @@ def onset_columns(along: BaseRun, effects: Sequence[Effect], record: int) -> dic
 def grown(
     effects: Sequence[Effect], columns: Mapping[Begun, np.ndarray], spacing: float
 ) -> dict[Begun, np.ndarray]:
-    """Return the columns of effects that grow from each time of a grid on, without any run.
+    """Return the columns of effects that grow from each onset of a grid, without any simulation.
 
-    What grows from t₀ on is a sum of steps, ∫ step(t − s) ds from t₀ to the end; by the trapezoidal rule, where the
-    last step, at the end, does nothing: within 2 to 5 % of what runs give, for those that begin well before the end.
-    None where the grid has no steps of the effect that grows.
+    An effect that grows from t₀ on is a sum of steps, ∫ step(t − s) ds from t₀ to the end; by the trapezoidal rule,
+    where the last step, at the end, does nothing: within 2 to 5 % of the simulated columns, for onsets well before
+    the end. No columns where the grid has no steps of the effect that grows.
     """
     found = dict[Begun, np.ndarray]()
     for effect in effects:
@@ -193,13 +193,13 @@ def grown(
 
 
 def _around(time: float, spacing: float) -> list[float]:
-    """Return the finer times between a time of the grid and its neighbours."""
+    """Return the onsets of the fine grid between one of the coarse grid and its neighbours."""
     finer = [time + i * spacing / FINE_PER_COARSE for i in range(1 - FINE_PER_COARSE, FINE_PER_COARSE) if i]
     return [round(candidate, 6) for candidate in finer]  # those of two neighbours are the same
 
 
 def _strongest(found: list[ChangePoint]) -> list[ChangePoint]:
-    """Return the best time of every effect, most probable first."""
+    """Return the best onset of every effect, most probable first."""
     ranked = sorted(found, key=lambda candidate: -candidate.log_gain)
     first = {candidate.effect.id: candidate for candidate in reversed(ranked)}
     return [
@@ -209,7 +209,9 @@ def _strongest(found: list[ChangePoint]) -> list[ChangePoint]:
 
 
 def _between(best: ChangePoint, found: list[ChangePoint]) -> float:
-    """Return how far a parabola through an effect's best time and its neighbours rises above it."""
+    """Return by how much a parabola through the gains at an effect's best onset and its neighbours rises above the
+    best.
+    """
     at = {candidate.time: candidate for candidate in found if candidate.effect.id == best.effect.id}
     own = [at[time] for time in sorted(at)]
     k = next(k for k, candidate in enumerate(own) if candidate.time == best.time)
@@ -225,7 +227,7 @@ def _between(best: ChangePoint, found: list[ChangePoint]) -> float:
 def _tried(
     point: LinearisationPoint, D: np.ndarray, columns: Mapping[Begun, np.ndarray], record: int
 ) -> list[ChangePoint]:
-    """Return the linear evidence of effects that begin at times, from their whitened sensitivities."""
+    """Return effects with onsets and their linear evidence, from their whitened sensitivities."""
     fit, made = point.fit, list(columns.values())
     q, whole = fit.quadratic, fit.r + fit.J @ fit.z
     sizes, data = (
@@ -241,7 +243,7 @@ def _tried(
 
 
 def gain_of(data: ForceInformation, effect: Effect) -> tuple[float, np.ndarray]:
-    """Return the log evidence of an effect over that of none, and the mean of its deviations."""
+    """Return the log evidence of an effect over that without it, and the mean of its deviations."""
     variance = np.array([parameter.scale**2 for parameter in effect.parameters])
     inner = np.eye(variance.size) + variance[:, None] * data.M
     M = np.linalg.solve(inner, np.diag(variance))
@@ -256,20 +258,21 @@ def gain_of(data: ForceInformation, effect: Effect) -> tuple[float, np.ndarray]:
 
 
 SAME_RUN_LEVELS = 1.0
-"""Along runs that differ by less than this many levels of the noise (root mean square of each channel), an onset
-changes the same: at so small a distance sensitivities differ by less than their steps make them err. [-]"""
+"""Simulations that differ by less than this many levels of the noise (root mean square of each channel) share the
+responses to onsets: sensitivities then differ by less than the error of their finite differences. [-]
+"""
 MOST_RUNS_KEPT = 6
-"""Along so many runs, the last ones, what onsets change is kept."""
+"""The responses to onsets are kept for so many simulations, the last ones."""
 
 
 class OnsetResponses(NamedTuple):
-    """What onsets change along a run.
+    """Responses to onsets along a simulation.
 
     Attributes:
         setting: the nominal one of the record.
         time: of its samples (n,). [s]
-        shown: what the run shows, channel → (n,).
-        changes: (effect, onset) → channel → what a unit of each parameter changes (n, parameters).
+        shown: the simulated record, channel → (n,).
+        changes: (effect, onset) → channel → response to a unit of each parameter (n, parameters).
     """
 
     setting: Setting
@@ -278,7 +281,7 @@ class OnsetResponses(NamedTuple):
     changes: dict[tuple[str, float], dict[str, np.ndarray]]
 
     def serves(self, other: OnsetResponses, seen: Observed) -> bool:
-        """Say whether another run of the same record is as good as this one."""
+        """Say whether the responses along another simulation of the same record can be used for this one."""
         if (
             self.setting is not other.setting
             or self.time is not other.time
@@ -293,8 +296,8 @@ class OnsetResponses(NamedTuple):
 
 
 def change_point_columns(along: BaseRun, pairs: Sequence[Begun], record: int = 0) -> list[np.ndarray]:
-    """Return whitened sensitivities (m, parameters) to each (effect, time) in one record; secants of a small step,
-    along the run or one that differs by less than the noise.
+    """Return whitened sensitivities (m, parameters) to each (effect, time) in one record; finite differences of a
+    small step, along the simulation or one that differs by less than the noise.
     """
     problem, seen = along.problem, along.problem.records[record]
     known = _responses_along(along, record)
@@ -316,7 +319,9 @@ def change_point_columns(along: BaseRun, pairs: Sequence[Begun], record: int = 0
 
 
 def _responses_along(along: BaseRun, record: int) -> OnsetResponses:
-    """Return what is known along a run that serves, or nothing along this one; the last runs are kept."""
+    """Return the cached responses along a simulation that is close enough, or an empty set along this one; the last
+    ones are kept.
+    """
     (problem, z), kept = along, along.problem.kept.onsets
     seen, (track,) = problem.records[record], problem.tracks([(record, z)])
     here = OnsetResponses(
@@ -332,7 +337,7 @@ def _responses_along(along: BaseRun, record: int) -> OnsetResponses:
 def _changes(
     along: BaseRun, pairs: Sequence[Begun], record: int
 ) -> dict[tuple[str, float], dict[str, np.ndarray]]:
-    """Return what onsets change along a run: (effect, onset) → channel → (n, parameters)."""
+    """Return the responses to onsets along a simulation: (effect, onset) → channel → (n, parameters)."""
     problem, z = along
     base, steps = _plain(problem, record, z), [np.diag(_steps(effect)) for effect, _ in pairs]
     jobs = [
@@ -359,7 +364,7 @@ def _changes(
 
 
 def _steps(effect: Effect) -> list[float]:
-    """Return the step of each parameter, to where there is more room."""
+    """Return the finite-difference step of each parameter, towards the farther bound."""
     return [
         SECANT_SCALES * parameter.scale * (1.0 if parameter.high >= -parameter.low else -1.0)
         for parameter in effect.parameters
@@ -367,24 +372,28 @@ def _steps(effect: Effect) -> list[float]:
 
 
 def _plain(problem: Problem, record: int, z: np.ndarray) -> Setting:
-    """Return the setting of a record, its sensors right."""
+    """Return the setting of a record, with sensors free of errors."""
     return problem.setting(record, z, late=False)
 
 
 def _run(stops: Mapping[float, Stop], job: tuple[Setting, float]) -> Track:
-    """Return the track of a setting that differs from a time on; from there, if the run before it went as far."""
+    """Return the track of a setting that differs from a time on; resumed from there, if the base simulation got that
+    far.
+    """
     setting, time = job
     return simulate_on(setting, stops[time]) if time in stops else simulate_track(setting)
 
 
 def _rows(problem: Problem, record: int) -> tuple[int, int]:
-    """Return where the rows of a record begin, and how many there are in all."""
+    """Return the first row of a record in the residual, and the number of all rows."""
     sizes = [sum(noise.count for noise in each.noise.values()) for each in problem.records]
     return sum(sizes[:record]), sum(sizes)
 
 
 def with_change_point(problem: Problem, change_point: ChangePoint) -> Problem:
-    """Return the problem with a sudden effect's parameters and its time behind its entries."""
+    """Return the problem with the parameters of an effect with a change point, and its onset, appended to its
+    entries.
+    """
     effect = with_free_onset(
         change_point.effect, change_point.time, float(problem.records[change_point.record].time[-1])
     )
@@ -393,8 +402,9 @@ def with_change_point(problem: Problem, change_point: ChangePoint) -> Problem:
 
 
 class RankedChangePoint(NamedTuple):
-    """A sudden cause in the linear problem of a place: log posterior, as of `Struck`; where its fit begins, all entries
-    and its parameters, if that is not the best of the linear problem.
+    """A cause with a change point in the linear problem at a linearisation point: log posterior, on the scale of
+    `FittedChangePoint`; start of its fit, all entries and its parameters, if that is not the optimum of the linear
+    problem.
     """
 
     log_posterior: float
@@ -403,14 +413,14 @@ class RankedChangePoint(NamedTuple):
     start: np.ndarray | None = None
 
     def at_most(self, share: float) -> float:
-        """Return the log posterior that its fit may have, if that share of what it gains is not linear."""
+        """Return the log posterior that its fit may reach, if non-linearity hides that share of its gain."""
         return self.log_posterior + self.change_point.between + share * max(self.change_point.log_gain, 0.0)
 
 
 def ranked_in(
     problem: Problem, point: LinearisationPoint, able: Sequence[Effect], record: int
 ) -> list[RankedChangePoint]:
-    """Return every sudden cause at its best time, in the linear problem of a place."""
+    """Return every cause with a change point at its best onset, in the linear problem at a linearisation point."""
     here = _log_none(problem, point.fit, record)
     found = scan(point, variances(problem.entries, (), 1.0), able, record)
     return [RankedChangePoint(here + candidate.log_gain, candidate, point) for candidate in found]
@@ -419,14 +429,14 @@ def ranked_in(
 def ranked_by_runs(
     problem: Problem, candidate: Candidate, able: Sequence[Effect], record: int
 ) -> list[RankedChangePoint]:
-    """Return the causes of a hypothesis from their best times on, by real runs from its fit: what nearly stops in
-    mid-trial says little where it is changed a little.
+    """Return the causes of a hypothesis with their best onsets, by simulations from its fit: for an effect that
+    nearly stops in mid-trial, the response to a small change is uninformative.
     """
     return [_large(problem, candidate.fit, effect, record) for effect in able if effect.id in candidate.ids]
 
 
 def _large(problem: Problem, fit: Fit, effect: Effect, record: int) -> RankedChangePoint:
-    """Return a cause at its best time and size, all else the best of the linear problem there."""
+    """Return a cause at its best onset and size, all other parameters at the optimum of the linear problem there."""
     own, times = columns_of(problem.entries, (effect.id,)), times_of(problem, record)
     low, high = bounds(problem)
     without = fit.z.copy()
@@ -460,7 +470,7 @@ def _at_size(
 
 
 def _log_none(problem: Problem, fit: Fit, record: int) -> float:
-    """Return the log posterior of nothing in the linear problem of a fit, and of any time at which it might begin."""
+    """Return the log posterior without a cause in the linear problem of a fit, with the log prior of an onset."""
     log = posterior(fit.quadratic, variances(problem.entries, (), 1.0)).log_evidence
     any_time = -float(np.log(len(times_of(problem, record))))
     return log + float(np.log(KAPPAS[1.0])) + log_prior((), len(nameable(problem.entries))) + any_time

@@ -1,15 +1,16 @@
-"""Which errors in the data a diagnosis goes on without: proposed by a scan, and then held against physics.
+"""Which data errors a diagnosis corrects: proposed by a scan, then compared with physical explanations.
 
-Nothing is named because `data_error_search` suspects it. Sets of suspects, from all of them to none, are explanations
-like others (`compared`): a record without them has a search of its own, with causes, what begins in mid-trial, forces
-and drifts, and an evidence on their scale (`data_error_evidence`).
+No error is named only because `data_error_search` suspects it. Sets of suspects, from all of them to none, are
+explanations like others (`compared`): a record without them is searched for causes, change points, forces and drifts,
+and has an evidence on the same scale (`data_error_evidence`).
 
-A search that is hopelessly behind ends within its first look, or with it. What the linear problem leaves no choice of
-is corrected before anything is searched, and the records with it are not searched at all if causes that hold throughout
-explain what is left (`excludes_physics`): what no vehicle does (another sign, unit or reference of one channel,
-exchanged columns, repeated values) where physics has no chance with all its parameters free at once; a command, a
-clock or a latency where a few causes, throughout or from mid-trial on, are hopelessly behind (`data_error_search`). A
-step in a sensor is always held against a search of the records with it.
+A search whose log posterior is HOPELESS_NATS below another ends during or after its screening. Errors on which the
+linear problem is decisive are corrected before any search, and the records with them are not searched at all if
+causes that hold throughout explain the corrected ones (`excludes_physics`): these are errors that no vehicle can
+cause (another sign, unit or reference of one channel, exchanged columns, repeated values), where physics is far less
+probable with all its parameters free at once; and errors of a command, a clock or a latency, where a few causes,
+throughout or from mid-trial on, are far less probable (`data_error_search`). A step in a sensor is always compared
+with a search of the records with it.
 """
 
 from __future__ import annotations
@@ -49,47 +50,50 @@ from subzero.diagnosis.inference.out_of_catalogue import Findings, is_explained,
 
 
 def excludes_physics(errors: Sequence[SuspectedError], work: Findings) -> bool:
-    """Say whether errors need not be held against a search of the records with them: what is left then is explained
-    without anything that begins in mid-trial, and without a force.
+    """Say whether errors need no comparison with a search of the records with them: the corrected records are
+    explained without a change point and without a latent force.
     """
-    outside = max((error.log_posterior for error in work.out_of_catalogue), default=-np.inf)
-    explained = work.search.best().log_posterior > outside and leaves_only_noise(work)
+    log_other = max((error.log_posterior for error in work.out_of_catalogue), default=-np.inf)
+    explained = work.search.best().log_posterior > log_other and leaves_only_noise(work)
     return explained and all(error.excludes_physics for error in errors)
 
 
 class DiagnosisSteps(Protocol):
-    """A search for causes, what begins in mid-trial, forces and drifts, in three parts; it may be interrupted."""
+    """A search for causes, change points, forces and drifts, in three parts; it may be interrupted."""
 
     def start(self, records: Sequence[Logged]) -> Findings:
         """Return how close wide tolerances come to records."""
 
     def begin(self, work: Findings, is_hopeless: Callable[[], bool]) -> None:
-        """Have a first look; if it is hopeless, no farther than outside, as what is there may explain records, too."""
+        """Do the first part, the screening; if it is hopeless, stop after explanations that are not in the catalogue,
+        as one of them may still explain the records.
+        """
 
     def finish(self, work: Findings) -> None:
-        """Find the rest."""
+        """Do the remaining part."""
 
 
 def compared(
     suspicion: Suspects, records: Sequence[Logged], look: DiagnosisSteps
 ) -> list[tuple[Explained, float]]:
-    """Return what errors the data may have, with what explains the records besides and its log evidence.
+    """Return the sets of errors that the data may have, with the explanation of the corrected records and its log
+    evidence.
 
-    The records without what no vehicle does, and without what physics has no chance against, get a first look. If that
-    explains what is left, by causes within declared tolerances or by what begins in mid-trial, only all errors together
-    are held against it, where they explain the records in the linear problem: a fin that jams in the first second does
-    what a command with the other sign does, and a lag what a delay does. If not, so are those without more, one after
-    the other: at once where all errors together explain the records; else after a whole search, as something may have
-    begun in mid-trial, which looks like a step or a clock. The most probable is finished, then what is not hopelessly
-    behind. While that is not clear, records with more errors get the same.
+    First, the records are screened without the errors that no vehicle can cause and those that exclude physics. If
+    causes within declared tolerances or a change point explain these records, only the set of all errors is compared
+    with them, where it explains the records in the linear problem: a fin that jams in the first second does what a
+    command with the other sign does, and a lag what a delay does. If not, sets with more errors are compared, one
+    after the other: at once where all errors together explain the records; else after a whole search, as a change
+    point may look like a step or a clock error. The most probable set is finished, then those that are not hopelessly
+    less probable. While the result is ambiguous, records with more errors left in them are treated likewise.
 
-    Where even wide tolerances do not come close, a first look takes long: if nothing outside explains the records,
-    those without more errors have theirs before it goes on.
+    Where the fit with wide tolerances is poor, screening takes long: if no explanation that is not in the catalogue
+    explains the records, those without more errors are screened before it goes on.
 
     Args:
-        suspicion: what a scan says.
+        suspicion: the suspects of a scan.
         records: as they are.
-        look: searches records.
+        look: the search of records.
     """
     comparison = _Comparison(suspicion, records, look)
     tried, numbers = comparison.tried, dict[int, tuple[SuspectedError, ...]]()
@@ -97,7 +101,7 @@ def compared(
         comparison.with_more()
         comparison.with_fewer()
         numbers = comparison.numbers_again()
-    except KeyboardInterrupt:  # before anything was found of one of them
+    except KeyboardInterrupt:  # before any of them has a result
         if not tried:
             raise
         tried[-1].work.complete = False
@@ -105,22 +109,22 @@ def compared(
     return [
         (
             replace(error, errors=numbers.get(id(error), error.errors)),
-            error.log_evidence(per_lost) + _of_samples_outside(error, least, records, per_lost),
+            error.log_evidence(per_lost) + _excess_of_samples_off_trial(error, least, records, per_lost),
         )
         for error in tried
     ]
 
 
-def _of_samples_outside(
+def _excess_of_samples_off_trial(
     explanation: Explained, least: Explained, records: Sequence[Logged], per_lost: Mapping[str, float]
 ) -> float:
-    """Return by how much samples that a clock or a delay puts outside the trial are more probable than those of their
-    channel on average: they have their density given all others, beside the explanation of the records with the least
-    errors,
+    """Return by how much samples that a clock error or a delay puts outside the trial are more probable than an
+    average sample of their channel: their density is conditional on all other samples, under the explanation of the
+    records with the least errors,
 
         log p(y outside | y inside) = log p(y) − log p(y inside)
 
-    The ends of a record are like no others: something begins there, and noise that wanders is at its farthest.
+    The ends of a record are not typical: there a motion begins, and noise that wanders has gone farthest.
     """
     kept, seen = _inside(explanation, least, records), least.work.problem.records
     gone = [
@@ -145,7 +149,9 @@ def _of_samples_outside(
 def _inside(
     explanation: Explained, least: Explained, records: Sequence[Logged]
 ) -> list[dict[str, np.ndarray]]:
-    """Return channel → which samples of the records with the least errors are inside the trial with others (n,)."""
+    """Return channel → which samples of the records with the least errors are inside the trial under another set
+    (n,).
+    """
     found = []
     for i, logged in enumerate(records):
         places, here = places_of(logged, explanation.errors, i), places_of(logged, least.errors, i)
@@ -155,7 +161,7 @@ def _inside(
 
 @dataclass(frozen=True, eq=False)
 class _Comparison:
-    """Sets of suspected errors, held against one another: those whose first look was taken are in `tried`."""
+    """A comparison of sets of suspected errors: those that have been screened are in `tried`."""
 
     suspicion: Suspects
     records: Sequence[Logged]
@@ -163,7 +169,7 @@ class _Comparison:
     tried: list[Explained] = field(default_factory=list)
 
     def with_more(self) -> None:
-        """Hold what no vehicle does, and what physics has no chance against, against records with more errors."""
+        """Compare the errors that no vehicle can cause, and those that exclude physics, with sets of more errors."""
         least, errors = self.suspicion.definite_count, self.suspicion.errors
         first, more = (
             self.suspicion.first(least),
@@ -178,20 +184,21 @@ class _Comparison:
         elif not explain(errors):
             self.look.finish(now.work)
             new, more = [], [] if leaves_only_noise(now.work) else more
-        self._race(new + self._looks(more if len(self.tried) == 1 else []))
+        self._finish_likeliest(new + self._looks(more if len(self.tried) == 1 else []))
 
     def with_fewer(self) -> None:
-        """Hold errors that are not clear against records with fewer of them corrected."""
+        """Compare errors that are not clear with sets in which fewer of them are corrected."""
         least = self.suspicion.definite_count
         for held, errors in pairwise([self.suspicion.first(least), *self.suspicion.fewer(least)]):
             if excludes_physics(held, _first(self.tried).work):
                 break
-            self._race(self._looks([errors]))
+            self._finish_likeliest(self._looks([errors]))
 
     def numbers_again(self) -> dict[int, tuple[SuspectedError, ...]]:
-        """Find the numbers of the most probable errors anew beside what explains the records, which are searched again
-        where others explain them better; and without errors that explain nothing by the same samples: two sets may
-        differ in what they hold to be an outlier. Return the identity of what is the most probable → its errors.
+        """Estimate the numbers of the most probable errors again, given the explanation of the records, and search
+        the records again where other numbers explain them better; and without errors that explain nothing by the same
+        samples: two sets may differ in which samples they take for outliers. Return the identity of the findings of
+        the most probable set → its errors.
         """
         while _is_complete(self.tried) and not (now := _first(self.tried)).work.given_up:
             found = numbers_again(now, self.records)
@@ -206,8 +213,8 @@ class _Comparison:
         return {id(now): found.errors} if found.may_be_told else {}
 
     def _without(self, needless: Sequence[SuspectedError], now: Explained) -> None:
-        """Search the records with some errors of a set left in them, in the place of all sets that hold one of them; if
-        that is interrupted before anything is found, what there was stays.
+        """Search the records with some errors of a set left in them, instead of all sets that hold one of them; if
+        that is interrupted before it has a result, the sets are unchanged.
         """
         gone, before = {(error.record, error.error.id) for error in needless}, self.tried[:]
         left = tuple(error for error in now.errors if (error.record, error.error.id) not in gone)
@@ -215,27 +222,31 @@ class _Comparison:
             error for error in self.tried if not _holds_one(error, gone) and error.errors != left
         ]
         try:
-            self._race([self._look_at(left, self.look.start(without(self.records, left)))])
+            self._finish_likeliest([self._look_at(left, self.look.start(without(self.records, left)))])
         except KeyboardInterrupt:
             self.tried[:] = self.tried or before
             raise
 
     def _again(self, old: Explained, errors: tuple[SuspectedError, ...]) -> Explained:
-        """Search the records without errors that have other numbers; return what explains more, and drop the other."""
+        """Search the records without the errors with their new numbers; return the more probable explanation, and
+        drop the other.
+        """
         new = self._look_at(errors, self.look.start(without(self.records, errors)))
-        self._race([new])
+        self._finish_likeliest([new])
         more, less = (old, new) if self._explains_more(old, new) else (new, old)
         self.tried.remove(less)
         return more
 
     def _explains_more(self, explanation: Explained, other: Explained) -> bool:
-        """Say whether errors with some numbers are more probable than with others, with what those put outside."""
+        """Say whether errors with some numbers are more probable than with others, counting the samples that either
+        puts outside the trial.
+        """
         per_lost = least_means([explanation, other])
-        outside = _of_samples_outside(explanation, other, self.records, per_lost)
-        return explanation.log_evidence(per_lost) + outside > other.log_evidence(per_lost)
+        excess = _excess_of_samples_off_trial(explanation, other, self.records, per_lost)
+        return explanation.log_evidence(per_lost) + excess > other.log_evidence(per_lost)
 
     def _looks(self, more: Sequence[tuple[SuspectedError, ...]]) -> list[Explained]:
-        """Give further sets of errors a first look, and return what is found, unless interrupted."""
+        """Screen further sets of errors, and return the findings, unless interrupted."""
         return [
             self._look_at(errors, self.look.start(without(self.records, errors)))
             for errors in more
@@ -248,8 +259,8 @@ class _Comparison:
         work: Findings,
         before: Sequence[tuple[SuspectedError, ...]] = (),
     ) -> Explained:
-        """Have a first look at records without errors, that was started; where that is asked whether it is hopeless,
-        and nothing that begins in mid-trial explains them, look at those without others before. Return what is found.
+        """Screen records without errors, in a search that was started; where that asks whether it is hopeless, and no
+        change point explains them, screen the records without the sets of `before` first. Return the findings.
         """
 
         def is_hopeless() -> bool:
@@ -262,8 +273,8 @@ class _Comparison:
         return self.tried[-1]
 
     def _is_hopeless(self, errors: tuple[SuspectedError, ...], work: Findings) -> bool:
-        """Say whether records without errors are hopelessly behind something that was tried, even with the causes of
-        that: what is far from a run is not found around it.
+        """Say whether records without errors are hopelessly less probable than a set that was tried, even with the
+        causes of that set: a cause far from the linearisation point is not found around it.
         """
         better = [
             suspect for suspect in self.tried if self._explained(errors, work).is_less_probable(suspect)
@@ -275,8 +286,8 @@ class _Comparison:
         now = self._explained(errors, work)
         return any(now.is_less_probable(suspect) for suspect in better)
 
-    def _race(self, new: Sequence[Explained]) -> None:
-        """Finish what may be the most probable, of what is new among what was tried."""
+    def _finish_likeliest(self, new: Sequence[Explained]) -> None:
+        """Finish the search of those of the new sets that may be the most probable one."""
         waiting = [error for error in new if not error.work.given_up]
         while waiting and _is_complete(self.tried):
             now = _first(waiting)
@@ -286,15 +297,15 @@ class _Comparison:
                 self.look.finish(now.work)
 
     def _fit_like_others(self, work: Findings) -> None:
-        """Fit what explains the records without other errors from where it does: a fit may end in a local minimum, and
-        what it lacks there is no evidence of an error.
+        """Fit the explanations of the other sets from their optimum: a fit may end in a local minimum, and a poor
+        local minimum is no evidence of an error.
         """
         for error in self.tried:
             if error.work is not work and error.work.problem.entries is work.problem.entries:
                 work.search.fit_like(error.work.search.best())
 
     def _explained(self, errors: tuple[SuspectedError, ...], work: Findings) -> Explained:
-        """Return records that are taken to have errors, with what was found in the records without them."""
+        """Return a set of errors with the findings in the records without them."""
         prior = sum(
             log_prior(error.error, ALIKE)
             + error.error.log_jacobian * measured_by(self.records[error.record], error.error)
@@ -309,8 +320,8 @@ class _Comparison:
         )
 
     def _lost(self, errors: Sequence[SuspectedError], work: Findings) -> Counter[str]:
-        """Return how many samples of each channel are no measurements without errors: more than 0 or fewer, where
-        channels are exchanged.
+        """Return how many samples of each channel are no measurements once errors are corrected: the number may be
+        negative where channels are exchanged.
         """
         lost = Counter[str]()
         for logged, seen in zip(self.records, work.problem.records, strict=True):
@@ -323,8 +334,8 @@ class _Comparison:
 
 
 def _is_settled(work: Findings) -> bool:
-    """Say whether a first look leaves nothing to be explained: by causes within declared tolerances, or by one that
-    begins in mid-trial, and is far before them.
+    """Say whether the screening explains the records: by causes within declared tolerances, or by one with a change
+    point that is far more probable than they are.
     """
     if is_explained(work.search, work.out_of_catalogue):
         return True
@@ -337,7 +348,7 @@ def _holds_one(explanation: Explained, errors: Container[tuple[int, str]]) -> bo
 
 
 def _is_complete(tried: Sequence[Explained]) -> bool:
-    """Say whether nothing was interrupted."""
+    """Say whether no search was interrupted."""
     return all(error.work.complete for error in tried)
 
 

@@ -1,20 +1,23 @@
-"""How probable a set of errors in the data is, with what explains the records besides, and what its numbers are.
+"""The log evidence of a set of data errors with an explanation of the corrected records, and estimates of its
+numbers.
 
 T the corrections, y the record as written:
 
     log p(y, errors) = log Σ_M p(T y | M) p(M) + Σ log|dT/dy| + Σ log p(error) + log p(noise)
 
-A sample that is lost counts as any other of its channel. But where a rounded channel may be frozen or stand still, what
-it repeats is certain in the one case, and in the other an interval each, no density (`repeated_values`).
+A lost sample counts as an average one of its channel. But where a rounded channel may be frozen or stand still, its
+repeated values are certain in the one case, and have the probability of an interval each, not a density, in the other
+(`repeated_values`).
 
-The scan finds a delay, a rate or a step in the linear problem about the nominal model, with noise as white as sensors
-usually have it. Where noise is slow, that prefers a number that makes the noise quick. So the number a has its density
-again in the linear problem around the best fit, with the noise behind that, all hypotheses that were fitted together:
+The scan finds a delay, a rate or a step in the linear problem about the nominal model, with the usual, nearly white
+noise of sensors. Where the noise is correlated, that favours a number which makes the residual less correlated. So
+the density of the number a is evaluated again in the linear problem around the best fit, with the noise estimated
+there, summed over all fitted hypotheses:
 
     log p(a | y) = log Σ_M p(M) ∫ p(T_a y | z) p(z | M) dz
 
-of the samples that no a that is tried puts outside the trial: so all are judged by the same ones. A parabola through
-five of its values has the mean of a and its standard deviation (`numbers_again`).
+over the samples that none of the tried a puts outside the trial, so that all are judged by the same samples. A
+parabola through five values of it gives the mean of a and its standard deviation (`numbers_again`).
 """
 
 from __future__ import annotations
@@ -54,30 +57,33 @@ if TYPE_CHECKING:
     Errors = Sequence[SuspectedError]
 
 ALIKE = 10
-"""So many errors of a kind share its probability, about."""
+"""Approximate number of errors that share the probability of a kind."""
 FIRST_SHARE = 0.01
-"""Numbers are first tried so far apart, as a share of what the scan has found; then by a standard deviation. [-]"""
+"""First distance between numbers that are tried, as a share of the number from the scan; later it is a standard
+deviation. [-]
+"""
 APART = np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
-"""Where a parabola is fitted, in those distances."""
+"""Points of a parabola, in those distances."""
 MOST_PARABOLAS, FARTHEST, SETTLED = 5, 4.0, 0.5
-"""So many parabolas there are at most; one reaches so many distances; a mean that moves by less than a share of one has
-settled. [-]"""
+"""Most parabolas; the farthest that the mean may move, in distances; the share of a distance below which it has
+converged. [-]
+"""
 Density = Callable[[Sequence[float]], np.ndarray]
-"""Some numbers → their log densities, but for what they have in common; minus infinity where one leaves no record."""
+"""Some numbers → their log densities, up to a common constant; minus infinity where a number leaves no record."""
 Samples = list[dict[str, np.ndarray]]
 """Record → channel → which samples, as they were written."""
 
 
 def leaves_only_noise(work: Findings) -> bool:
-    """Say whether one explanation leaves nothing but the noise of usual sensors."""
+    """Say whether some explanation leaves only the noise of usual sensors."""
     return _is_quiet(work) and (
         not is_poor_fit(work.search.best().fit) or any(error.point for error in work.out_of_catalogue)
     )
 
 
 def _is_quiet(work: Findings) -> bool:
-    """Say whether the most probable explanation leaves no channel more than the noise of a usual sensor: the noise that
-    was estimated behind wide tolerances may be that of a misfit, which something explains by now.
+    """Say whether the residual of the most probable explanation is no larger than a usual sensor's noise in any
+    channel: the noise that was estimated from the wide fit may contain a misfit, which is explained by now.
     """
     problem, r = _best_residual(work)
     for i, record in enumerate(problem.records):
@@ -98,8 +104,8 @@ class StillChannel(NamedTuple):
     run: np.ndarray
 
     def log_excess(self, work: Findings) -> float:
-        """Return by how much the evidence is too great with its values as densities: what they add to it behind the
-        best fit, and the log odds that it is frozen, not standing still, where each value is an interval.
+        """Return by how much the evidence is too large with its values as densities: their contribution at the best
+        fit, and the log odds that the channel is frozen, not standing still, where each value is an interval.
         """
         problem, r = _best_residual(work)
         record, white = problem.records[self.record], _own(problem, r, self.record, self.channel)
@@ -113,8 +119,8 @@ class StillChannel(NamedTuple):
 
 
 def _best_residual(work: Findings) -> tuple[Problem, np.ndarray]:
-    """Return the residual (m,) of the most probable explanation that has a run of its own, and its problem: of a drift
-    there is none.
+    """Return the residual (m,) of the most probable explanation that has a simulation of its own, and its problem; a
+    drift has none.
     """
     best = work.search.best()
     least, found = best.log_posterior, (work.problem, best.fit.r)
@@ -141,7 +147,7 @@ def _own(problem: Problem, r: np.ndarray, record: int, channel: str) -> np.ndarr
 def still_channels_of(
     whole: Suspects, errors: Sequence[SuspectedError], records: Sequence[Logged]
 ) -> tuple[StillChannel, ...]:
-    """Return the rounded channels that are held to stand still where only some suspected errors are corrected."""
+    """Return the rounded channels that are assumed to stand still where only some suspected errors are corrected."""
     return tuple(
         StillChannel(error.record, error.error.channels[0], lost_by(error, errors, records))
         for error in whole.errors
@@ -150,7 +156,7 @@ def still_channels_of(
 
 
 def lost_by(error: SuspectedError, errors: Sequence[SuspectedError], records: Sequence[Logged]) -> np.ndarray:
-    """Return which samples of its channel (n,) one more error takes from a record."""
+    """Return which samples of its channel (n,) a further error removes from a record."""
     others = tuple(each.error for each in errors if each.record == error.record and each is not error)
     before, after = (
         np.isfinite(corrected(records[error.record], found).record.values[error.error.channels[0]])
@@ -161,14 +167,14 @@ def lost_by(error: SuspectedError, errors: Sequence[SuspectedError], records: Se
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Explained:
-    """Records that are taken to have errors in their data, and what explains them besides.
+    """A set of data errors, and the explanation of the corrected records.
 
     Attributes:
         errors: in the data.
-        work: what was found in the records without them.
-        log_prior: of the errors, and what their corrections stretch.
-        lost: channel → samples that are no measurements then, but for those of rounded channels that are frozen.
-        standing: rounded channels that are held to stand still.
+        work: findings in the records without them.
+        log_prior: of the errors, with the log Jacobian of their corrections.
+        lost: channel → samples that are then no measurements, but for those of rounded channels that are frozen.
+        standing: rounded channels that are assumed to stand still.
     """
 
     errors: tuple[SuspectedError, ...]
@@ -178,9 +184,9 @@ class Explained:
     standing: tuple[StillChannel, ...] = ()
 
     def log_evidence(self, per_lost: Mapping[str, float]) -> float:
-        """Return the log evidence of the records as they were written; of samples that are lost, each so much as its
-        channel is given. That a frozen channel repeats its value is certain; one that stands still has its odds in
-        place of a density.
+        """Return the log evidence of the records as they were written; each lost sample counts `per_lost` of its
+        channel. The repeated values of a frozen channel are certain; one that stands still counts by its odds instead
+        of a density.
         """
         standing = sum(error.log_excess(self.work) for error in self.standing)
         lost = sum(count * per_lost.get(name, 0.0) for name, count in self.lost.items())
@@ -199,14 +205,18 @@ class Explained:
         return {name: total[name] / count for name, count in samples.items() if count}
 
     def is_less_probable(self, other: Explained) -> bool:
-        """Say whether no more causes, nor better fits, bring it close to another that leaves only noise."""
+        """Say whether neither more causes nor better fits can bring it close to another set that leaves only
+        noise.
+        """
         if other is self or not leaves_only_noise(other.work):
             return False
         per_lost, behind = least_means([self, other]), settings.DECISIVE_NATS
         return self.log_evidence(per_lost) + self._to_be_gained() < other.log_evidence(per_lost) - behind
 
     def _to_be_gained(self) -> float:
-        """Return what better fits promise; while only the wide one was made, what any may promise."""
+        """Return the predicted gain of better fits; while only the wide fit exists, the largest possible predicted
+        gain.
+        """
         if not self.work.search.screen.log_posterior:
             return settings.MAX_PREDICTED_GAIN_NATS
         fits = self.work.search.candidates.values()
@@ -228,8 +238,8 @@ def without(records: Sequence[Logged], errors: Errors) -> list[Logged]:
 
 
 def places_of(logged: Logged, errors: Errors, record: int) -> dict[str, np.ndarray]:
-    """Return channel → which of the samples that were written stands where when clocks are put right (n,); NaN where
-    none does.
+    """Return channel → index of the written sample at each place when clocks are corrected (n,); NaN where there is
+    none.
     """
     return places(
         logged, [error.error for error in errors if error.record == record and error.error.kind in SHIFTS]
@@ -237,7 +247,7 @@ def places_of(logged: Logged, errors: Errors, record: int) -> dict[str, np.ndarr
 
 
 def measured_by(logged: Logged, error: DataError) -> int:
-    """Return how many samples of an error's channels were measured."""
+    """Return the number of measured samples of an error's channels."""
     return sum(
         int(np.isfinite(logged.record.values[name]).sum())
         for name in error.channels
@@ -253,7 +263,7 @@ def log_evidence(work: Findings) -> float:
 
 
 def samples_of(work: Findings) -> Counter[str]:
-    """Return how many samples of each channel were measured."""
+    """Return the number of measured samples of each channel."""
     samples = Counter[str]()
     for record in work.problem.records:
         samples.update({name: int(np.isfinite(record.values[name]).sum()) for name in record.noise})
@@ -261,7 +271,9 @@ def samples_of(work: Findings) -> Counter[str]:
 
 
 def _fixed(record: Observed, name: str) -> float:
-    """Return what the noise of a channel adds to its log density: −½ log det Σ, what outliers cost, and its prior."""
+    """Return the terms of a channel's log density that depend on its noise alone: −½ log det Σ, the cost of outliers,
+    and its prior.
+    """
     return log_of_outliers(*_outliers(record, name)) + log_density_of_noise(record, name)
 
 
@@ -271,15 +283,17 @@ def log_outlier(record: Observed, name: str) -> float:
 
 
 def _outliers(record: Observed, name: str) -> tuple[int, int, float]:
-    """Return how many samples of a channel are outliers, how many were measured, and the usual level of its sensor."""
+    """Return how many samples of a channel are outliers, how many were measured, and the usual level of its
+    sensor.
+    """
     measured = int(np.isfinite(record.values[name]).sum())
     return measured - record.noise[name].count, measured, sensor_of(record, name).level
 
 
 class Numbers(NamedTuple):
-    """Errors with their numbers found anew; by how much the records are more probable so [nat]; those of them that
-    explain nothing, by the same samples and what is known beforehand; and whether the numbers can be told: they are
-    those beside hypotheses, and something outside the catalogue may explain the records better.
+    """Errors with their numbers estimated again; the gain in log probability of the records [nat]; those of them that
+    explain nothing, by the same samples and prior knowledge; and whether the numbers may be reported: they are
+    conditional on hypotheses, and an explanation that is not in the catalogue may explain the records better.
     """
 
     errors: tuple[SuspectedError, ...]
@@ -289,16 +303,16 @@ class Numbers(NamedTuple):
 
 
 def numbers_again(explanation: Explained, records: Sequence[Logged]) -> Numbers:
-    """Return the errors of an explanation with their numbers, found anew one after the other, and the gain.
+    """Return the errors of an explanation with their numbers, estimated again one after the other, and the gain.
 
     Args:
-        explanation: errors, and what explains the records without them.
+        explanation: errors, and the explanation of the records without them.
         records: as they were written.
     """
     needless: list[SuspectedError] = []
     errors, gain = list(explanation.errors), 0.0
-    outside = max((each.log_posterior for each in explanation.work.out_of_catalogue), default=-np.inf)
-    may_be_told = outside <= explanation.work.search.best().log_posterior
+    log_other = max((each.log_posterior for each in explanation.work.out_of_catalogue), default=-np.inf)
+    may_be_told = log_other <= explanation.work.search.best().log_posterior
     samples = _known(explanation.work.search, records, explanation.errors)
     for i, each in enumerate(explanation.errors):
         if each.error.kind in NUMBERED and not each.is_read_off:
@@ -317,8 +331,8 @@ def numbers_again(explanation: Explained, records: Sequence[Logged]) -> Numbers:
 def _density(
     search: Search, samples: Samples, records: Sequence[Logged], errors: Errors, i: int
 ) -> tuple[Density, float]:
-    """Return the log density of the number of one of some errors, and where to look for its peak: what the fit has the
-    clock late besides is part of a late clock.
+    """Return the log density of the number of one of some errors, and where to look for its peak: a clock offset in
+    the fit is part of the number of a late clock.
     """
     amount, z = errors[i].error.amount, search.best().fit.z.copy()
     late = [k for k, entry in enumerate(search.problem.entries) if entry.effect.id == CLOCK.id]
@@ -341,7 +355,7 @@ def _with_number(error: SuspectedError, amount: float, sd: float = 0.0) -> Suspe
 
 
 class Peak(NamedTuple):
-    """Mean and standard deviation of a number, and by how much its log density is greater there than at first."""
+    """Mean and standard deviation of a number, and the gain of its log density over the first value."""
 
     mean: float
     sd: float
@@ -349,11 +363,11 @@ class Peak(NamedTuple):
 
 
 def peak(logs_of: Density, known: float, first: float, apart: float) -> Peak | None:
-    """Return where a log density is greatest, by parabolas; None if there is no peak near by.
+    """Return the peak of a log density, by parabolas; None if there is no peak close by.
 
     Args:
         logs_of: the density.
-        known: the number so far, which the gain is over.
+        known: the number so far, the reference of the gain.
         first: where to begin.
         apart: how far apart numbers are tried at first.
     """
@@ -374,7 +388,7 @@ def peak(logs_of: Density, known: float, first: float, apart: float) -> Peak | N
 
 
 def _known(search: Search, records: Sequence[Logged], errors: Errors) -> Samples:
-    """Return the samples that the fits without errors are made to: no outliers."""
+    """Return the samples that the fits without errors use: no outliers."""
     found = Samples()
     for i, (logged, record) in enumerate(zip(records, search.problem.records, strict=True)):
         where = places_of(logged, errors, i)
@@ -383,7 +397,7 @@ def _known(search: Search, records: Sequence[Logged], errors: Errors) -> Samples
 
 
 def _inside_of_all(known: Samples, records: Sequence[Logged], several: Sequence[Errors]) -> Samples:
-    """Return those of known samples that none of several sets of errors puts outside the trial."""
+    """Return the known samples that none of several sets of errors puts outside the trial."""
     found = [dict(error) for error in known]
     for errors in several:
         for i, logged in enumerate(records):
@@ -395,9 +409,9 @@ def _inside_of_all(known: Samples, records: Sequence[Logged], several: Sequence[
 def _log_density(
     search: Search, z: np.ndarray, records: Sequence[Logged], errors: Errors, kept: Samples
 ) -> float:
-    """Return the log density of some samples of records in the linear problem around z (k,), but for what does not
-    depend on the numbers of errors: all hypotheses that were fitted together, as a cause may do what a number does, and
-    is none where the number is right; with the noise that is the most probable beside the best of them.
+    """Return the log density of some samples of records in the linear problem around z (k,), up to terms that do not
+    depend on the numbers of errors: summed over all fitted hypotheses, as a cause may do what a number does and be
+    absent where the number is right; with the noise that is the most probable given the best of them.
     """
     problem = _posed_like(search, records, errors, kept)
     J, count = problem.jacobian(z), len(nameable(problem.entries))
@@ -416,7 +430,7 @@ def _log_density(
 
 
 def _posed_like(search: Search, records: Sequence[Logged], errors: Errors, kept: Samples) -> Problem:
-    """Return the problem of some samples of records without errors, with the noise behind the best fit."""
+    """Return the problem of some samples of records without errors, with the noise estimated at the best fit."""
     new = posed_again(search.problem, without(records, errors))
     pairs = enumerate(zip(search.problem.records, new.records, strict=True))
     made = [_similar(old, seen, kept[i], places_of(records[i], errors, i)) for i, (old, seen) in pairs]
@@ -426,8 +440,8 @@ def _posed_like(search: Search, records: Sequence[Logged], errors: Errors, kept:
 def _similar(
     old: Observed, new: Observed, kept: Mapping[str, np.ndarray], where: Mapping[str, np.ndarray]
 ) -> Observed:
-    """Return a record with the noise of another, and with what is known of the error of its steps; only with some of
-    the samples that were written, which stand somewhere in it (n,).
+    """Return a record with the noise and the step errors of another; restricted to some of the written samples;
+    `where` has the written sample at each place in it (n,).
     """
     noise = {}
     for name, each in old.noise.items():

@@ -1,13 +1,14 @@
-"""What the nominal model, and all that may be wrong with it, say of a record, or of one without an error.
+"""The saturated model of a record: all parameters free at once, the most that physics may explain of it, or of one
+without an error.
 
-The yardstick is generous to physics. All parameters are free at once, each as far as a cause may go, in the linear
-problem at the nominal model; and every channel has a scale of its noise that is free, so that what a linear model
-cannot follow makes a channel count for less, and not the others bend:
+All parameters are free at once under wide priors, each as far as a cause may go, in the linear problem at the nominal
+model; and every channel has a free scale of its noise, so that a misfit which a linear model cannot follow gives its
+channel less weight, instead of distorting the parameters:
 
     G = max over s of  log N(W y; W h, s² I + J D Jᵀ) − Σ n_c log s_c,      D = (max(size of a cause, 4 τ))²
 
-Beside it stands the evidence of nothing and of single causes within wide tolerances. Only other commands are simulated:
-at first the nominal model alone, and with all sensitivities where they may be the right ones.
+In addition there is the evidence of no cause and of single causes within wide tolerances. Only other commands are
+simulated: at first the nominal model alone, and with all sensitivities where they may be the true ones.
 """
 
 from __future__ import annotations
@@ -44,22 +45,23 @@ from subzero.diagnosis.inference.problem import Problem
 from subzero.diagnosis.inference.simulator import Track, simulate_track
 
 KAPPA_NARROW = 2.0
-"""How much wider than declared tolerances are where a cause stands by itself: the linear problem is no better."""
+"""Widening κ of the declared tolerances where a single cause is free: the linear problem is no more accurate."""
 LEAST_SCALE, MOST_SCALE, ROUNDS, SETTLED = 0.3, 1e4, 5, 0.01
-"""Scales of the noise of a channel, and how often they are found anew behind the parameters, if they still change by
-more than that share: a hundredth costs less than 0.1 nats, as the best scales are stationary. Of a rounded one it is
-never so small that a sample has more density than 1/q, which is a probability of 1."""
+"""Bounds of the scale of a channel's noise; most re-estimates of the scales after the parameters; the relative change
+below which they have converged: a hundredth costs less than 0.1 nats, as the best scales are stationary. The scale of
+a rounded channel is never so small that a sample has a density above 1/q, which is a probability of 1.
+"""
 LOUD = 2.5
-"""Noise of more usual levels hides a misfit. [-]"""
+"""Noise of more than this many usual levels hides a misfit. [-]"""
 BESIDE_JUMP = 10
-"""So many samples before and after say how large a jump is."""
+"""Number of samples before and after a jump that its size is measured from."""
 CAUSES_TRIED = 3
-"""So many causes, the most promising, have the scales of the noise found behind them."""
+"""Number of causes, the best in the linear problem, for which the scales of the noise are estimated."""
 
 
 class Term(NamedTuple):
-    """What a channel says of the parameters: JᵀJ, Jᵀr, |r|², whitened; how many samples, and ½ log det of their noise
-    with what outliers cost; the least scale of its noise; and how many were measured, with outliers.
+    """A channel's whitened information on the parameters: JᵀJ, Jᵀr, |r|²; number of samples; ½ log det of their noise
+    with the cost of outliers; the least scale of its noise; and the number of measured samples, with outliers.
     """
 
     A: np.ndarray
@@ -72,7 +74,9 @@ class Term(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """The generous evidence, the parameters (k,) and their covariance, and the scale of the noise of each channel."""
+    """The evidence of the saturated model, the parameters (k,) and their covariance, and the scale of the noise of
+    each channel.
+    """
 
     log: float
     z: np.ndarray
@@ -82,26 +86,26 @@ class Evidence(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SaturatedModel:
-    """What the nominal model, and all that may be wrong with it, say of a record at any time.
+    """The nominal model and its sensitivities along a record: its predictions at any time, with all parameters free.
 
     Attributes:
-        logged: the record as it is said to be, but for what is corrected in it.
+        logged: the record as it is assumed to be, but for the errors that are corrected in it.
         written: the record as it is.
         step: between times of the prediction, from 0 on. [s]
-        nominal: channel → prediction of the nominal model (g,), by what is linear close to z. [display unit]
+        nominal: channel → prediction of the nominal model (g,), by the linearisation at z. [display unit]
         slopes: channel → sensitivities to all parameters (g, k).
-        D: prior variances that are generous to physics: every cause at once (k,).
+        D: wide prior variances: every cause at once (k,).
         narrow: prior variances of wide tolerances (k,).
         causes: places of the parameters of each cause.
         scales: channel → the place of the scale of its sensor, if that is a cause.
-        z: where it is linear (k,).
+        z: the linearisation point (k,).
         setting: of its simulations there.
         repeated: values that it repeats, which may be a channel that is rounded and stands still.
         corrected: errors that are corrected in it already.
-        place: among those, where a further error is undone; behind them all if not given.
-        clock: that is late by less than an error, if any: a cause, which is put right behind all errors.
+        place: among those, where a further error is corrected; after them all if not given.
+        clock: a clock that is late by less than an error, if any: a cause, which is corrected after all errors.
         kept: predictions under other commands.
-        others: commands → what is judged by under them, with sensitivities of its own.
+        others: commands → the saturated model under them, with sensitivities of its own.
     """
 
     logged: Logged
@@ -123,14 +127,16 @@ class SaturatedModel:
     others: dict[bytes, SaturatedModel] = field(default_factory=dict)
 
     def without(self, error: DataError) -> Logged:
-        """Return the record without a further error: a value that it repeats stands at the times that were written."""
+        """Return the record without a further error: the times of a value that it repeats are those that were
+        written.
+        """
         if self.is_last(error):
             return error.corrected(self.logged)
         return corrected(self.written, (*self.corrected[: self.place], error, *self._later))
 
     def after(self, errors: Sequence[DataError], place: int | None = None) -> SaturatedModel:
-        """Return what the record as it is written is judged by without some errors, and by a further one in a place
-        among them; with other commands it has sensitivities of its own.
+        """Return the saturated model of the written record without some errors, where a further one is corrected at a
+        place among them; with other commands it has sensitivities of its own.
         """
         every, here = (*errors, *self.clock), len(errors) if place is None and self.clock else place
         base = self.under(corrected(self.written, every))
@@ -147,21 +153,21 @@ class SaturatedModel:
         return replace(self, D=D)
 
     def is_last(self, error: DataError) -> bool:
-        """Say whether a further error is undone behind all that are corrected."""
+        """Say whether a further error is corrected after all others."""
         return not self._later and not (error.kind in REPEATED and self.corrected)
 
     @property
     def _later(self) -> tuple[DataError, ...]:
-        """Return what is corrected behind a further error."""
+        """Return the errors that are corrected after a further one."""
         return () if self.place is None else self.corrected[self.place :]
 
     @property
     def time(self) -> np.ndarray:
-        """Return the times at which a further error stands (n,). [s]"""
+        """Return the times of the samples at the place of a further error (n,). [s]"""
         return corrected(self.written, self.corrected[: self.place]).record.time
 
     def under(self, logged: Logged) -> SaturatedModel:
-        """Return what a record is judged by under its own commands, if they are others than this one's."""
+        """Return the saturated model under the commands of a record, if they differ from this one's."""
         commands = logged.setting.trial.commands
         if commands is self.logged.setting.trial.commands or commands is None:
             return replace(self, logged=logged)
@@ -171,7 +177,7 @@ class SaturatedModel:
         return replace(self.others[key], logged=logged, others=self.others)
 
     def terms(self, logged: Logged, channels: Iterable[str]) -> dict[str, Term]:
-        """Return what channels of a record, or of a corrected one, say of the parameters."""
+        """Return the information of channels of a record, or of a corrected one, on the parameters."""
         nominal = self.nominal_of(logged)
         return {name: self._term(logged, name, nominal[name]) for name in channels}
 
@@ -188,13 +194,13 @@ class SaturatedModel:
         return self.kept[key]
 
     def at(self, rows: np.ndarray, time: np.ndarray) -> np.ndarray:
-        """Return what stands on the grid (g, …) at times (n,): linear between, held at the ends."""
+        """Return rows of the grid (g, …) at times (n,): linear between, held at the ends."""
         low, share = self._places(time, rows.shape[0])
         share = share.reshape(-1, *(1,) * (rows.ndim - 1))
         return (1.0 - share) * rows[low] + share * rows[low + 1]
 
     def _places(self, time: np.ndarray, count: int) -> Between:
-        """Return between which of so many rows times (n,) lie."""
+        """Return the rows, of `count`, between which times (n,) lie."""
         x = np.clip(time / self.step, 0.0, count - 1.000001)
         low = x.astype(np.int64)
         return Between(low, x - low)
@@ -215,7 +221,7 @@ class SaturatedModel:
     def _left(
         self, logged: Logged, name: str, nominal: np.ndarray, usual: SensorPrior
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return measured − predicted of a channel (n,), and which samples are measured, and no outliers (n,)."""
+        """Return measured − predicted of a channel (n,), and which samples are measured and no outliers (n,)."""
         values, expected = logged.record.values[name], self.at(nominal, logged.record.time)
         left = (turned(values, expected) if name == HEADING else values) - expected
         used = np.isfinite(left)
@@ -233,22 +239,22 @@ class SaturatedModel:
 
     @cached_property
     def own(self) -> dict[str, Term]:
-        """What the record as it is says."""
+        """The information of the record as it is, channel by channel."""
         return self.terms(self.logged, self.logged.record.values)
 
     @cached_property
     def as_is(self) -> Evidence:
-        """The generous evidence of the record as it is."""
+        """The evidence of the saturated model for the record as it is."""
         return evidence_of_terms(stacked(self.own), self.D)
 
     @cached_property
     def log_sparse(self) -> float:
-        """The evidence of nothing, and of every cause by itself, of the record as it is."""
+        """The log evidence of no cause and of single causes, mixed, for the record as it is."""
         return self.sparse(self.own)
 
     @property
     def log_none(self) -> float:
-        """The evidence of nothing, of the record as it is."""
+        """The log evidence of no cause, for the record as it is."""
         return evidence_of_terms(stacked(self.own), self.narrow).log + float(np.log(PRIOR["none"]))
 
     def deviations(self, name: str, z: np.ndarray) -> np.ndarray:
@@ -259,8 +265,8 @@ class SaturatedModel:
         return values - expected - self.at(self.slopes[name], time) @ z
 
     def by_whole_steps(self, error: DataError) -> list[DataError]:
-        """Return a step in a rounded sensor, known but for whole steps, with amounts about as large as what the
-        prediction leaves jumps by.
+        """Return a step in a rounded sensor, known but for whole steps, with amounts about as large as the jump of
+        the residual.
         """
         (name,) = error.channels
         deviations, time = self.deviations(name, self.as_is.z), self.logged.record.time
@@ -272,11 +278,13 @@ class SaturatedModel:
         return [replace(error, amount=error.amount + step * (near + k)) for k in (-1.0, 0.0, 1.0)]
 
     def generous(self, terms: Mapping[str, Term]) -> float:
-        """Return the log evidence with all of physics at once."""
+        """Return the log evidence of the saturated model."""
         return evidence_of_terms(stacked(terms), self.D).log
 
     def added(self, name: str, rest: Term, as_is: Evidence) -> float:
-        """Return what samples of a channel that are not in its rest add to the log density of the record as it is."""
+        """Return the contribution to the log density of the record as it is of the samples of a channel that are not
+        in `rest`.
+        """
         own, scale = self.own[name], as_is.scales[name]
         square = _square(own, as_is.z) - _square(rest, as_is.z)
         lost = own.samples - rest.samples
@@ -290,8 +298,9 @@ class SaturatedModel:
         return {name: some & np.isfinite(self.logged.record.values[name]) for name, some in lost.items()}
 
     def of_lost(self, name: str, lost: np.ndarray, as_is: Evidence) -> float:
-        """Return what samples of a channel (n,) add to the log density of the record as it is: each as much as another
-        of its kind, a measurement or an outlier. That one of few more is an outlier is worth as much as ten others.
+        """Return the contribution of samples of a channel (n,) to the log density of the record as it is: each counts
+        as the average of its kind, a measurement or an outlier. That one of few more is an outlier is worth as much
+        as ten others.
         """
         own, used = self.own[name], self.used[name]
         said = own.measured - own.samples, own.measured, level_of(name, self.logged.noise)
@@ -300,16 +309,16 @@ class SaturatedModel:
         return np.count_nonzero(lost & used) * mean + np.count_nonzero(lost & ~used) * of_outlier
 
     def sparse(self, terms: Mapping[str, Term]) -> float:
-        """Return the log evidence of nothing, and of every cause by itself, mixed; within wide tolerances."""
+        """Return the log evidence of no cause and of single causes, mixed; within wide tolerances."""
         return log_sum([log for log, _ in self._each(terms)])
 
     @cached_property
     def likeliest(self) -> Evidence:
-        """The most probable of nothing and single causes, of the record as it is."""
+        """The evidence of the most probable of no cause and single causes, for the record as it is."""
         return max(self._each(self.own), key=lambda pair: pair[0])[1]
 
     def _each(self, terms: Mapping[str, Term]) -> list[tuple[float, Evidence]]:
-        """Return nothing and the best causes with their log posteriors."""
+        """Return the evidence of no cause and of the best causes, with their log posteriors."""
         said = stacked(terms)
         none = evidence_of_terms(said, self.narrow)
         base = Posterior(z=none.z, M=none.M, log_evidence=none.log, log_det=0.0)
@@ -329,7 +338,9 @@ class SaturatedModel:
 
 
 class Stacked(NamedTuple):
-    """What channels say, together: their names (c,), JᵀJ (c, k²), Jᵀr (c, k), and (c,) each of the rest of a `Term`."""
+    """The terms of channels, stacked: their names (c,), JᵀJ (c, k²), Jᵀr (c, k), and (c,) each of the other fields of
+    a `Term`.
+    """
 
     names: tuple[str, ...]
     A: np.ndarray
@@ -341,13 +352,13 @@ class Stacked(NamedTuple):
 
 
 def stacked(terms: Mapping[str, Term]) -> Stacked:
-    """Return what channels say, together."""
+    """Return the terms of channels, stacked."""
     A, b, rr, samples, fixed, least, _ = (np.array(column) for column in zip(*terms.values(), strict=True))
     return Stacked(tuple(terms), A.reshape(len(A), -1), b, rr, np.maximum(samples, 1), fixed, least)
 
 
 def evidence_of_terms(said: Stacked, D: np.ndarray) -> Evidence:
-    """Return the generous evidence of what channels say."""
+    """Return the evidence of the saturated model from the terms of channels."""
     names, A, b, rr, samples, fixed, least = said
     root = np.sqrt(D)
     scales = _scales(rr, samples, least)
@@ -375,12 +386,12 @@ def _covariance(A: np.ndarray, root: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _square(term: Term, z: np.ndarray) -> float:
-    """Return the square of what is left of a channel with parameters (k,), whitened."""
+    """Return the squared whitened residual of a channel with parameters (k,)."""
     return term.rr - 2.0 * float(term.b @ z) + float(z @ term.A @ z)
 
 
 def _scales(square: np.ndarray, samples: np.ndarray, least: np.ndarray) -> np.ndarray:
-    """Return the scales of the noise of channels of which squares are left (c,)."""
+    """Return the scales of the noise of channels from their squared residuals (c,)."""
     return np.clip(np.sqrt(np.maximum(square, 0.0) / samples), least, MOST_SCALE)
 
 
@@ -393,14 +404,14 @@ def least_scale(noise: Noise) -> float:
 def saturated_model_of(
     problem: Problem, record: int, logged: Logged, z: np.ndarray | None = None
 ) -> SaturatedModel:
-    """Return what a record is judged by; its simulations are those of the sensitivities at the nominal model, or at
-    another.
+    """Return the saturated model of a record; its simulations are those of the sensitivities at the nominal model, or
+    at another linearisation point.
 
     Args:
         problem: all records and parameters.
         record: its number.
         logged: the record.
-        z: deviations of the model that is linear close by (k,); of the nominal one if not given.
+        z: deviations of the linearisation point (k,); the nominal model if not given.
     """
     z, found = np.zeros(len(problem.entries)) if z is None else z, problem.records[record]
     names = [name for name in logged.record.values if name in found.noise]
@@ -433,15 +444,15 @@ def saturated_model_of(
 
 
 def generous_variances(problem: Problem) -> np.ndarray:
-    """Return prior variances of every cause at once (k,)."""
+    """Return the wide prior variances, with every cause free at once (k,)."""
     return np.array(
         [max(e.parameter.scale, max(KAPPAS) * e.parameter.tolerance) ** 2 for e in problem.entries]
     )
 
 
 def to_usual_sizes(problem: Problem, k: int, z: np.ndarray) -> np.ndarray:
-    """Return deviations z (k,) with an entry moved for a sensitivity: what does nothing while it is small to a usual
-    size.
+    """Return deviations z (k,) with an entry moved for a finite difference: to a usual size if it does nothing while
+    it is small.
     """
     parameter, moved = problem.entries[k].parameter, z.copy()
     if parameter.low < 0.0 or z[k] > 0.0 or problem.entries[k].effect.slot == "sensors":
@@ -451,7 +462,7 @@ def to_usual_sizes(problem: Problem, k: int, z: np.ndarray) -> np.ndarray:
 
 
 def shown_on_grid(setting: Setting, track: Track, names: Iterable[str]) -> dict[str, np.ndarray]:
-    """Return what the sensors show at the times of a track: channel → (g,), in its display unit."""
+    """Return the sensors' readings at the times of a track: channel → (g,), in its display unit."""
     grid, states = track
     shown = {name: sensed(setting.sensing.get(name), grid, truth(setting, states, name)) for name in names}
     if setting.clock_offset:

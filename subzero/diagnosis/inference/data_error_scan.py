@@ -1,9 +1,9 @@
-"""Which errors in the data would explain a record better: each correction judged against all that physics could do.
+"""Which errors in the data would explain a record better: each correction compared with the saturated model.
 
-An error in the data is suspected if the corrected record has an evidence that is ahead of the record's own as it is
-(`data_error_saturated_model`), counted in the units in which it was written, and with what is known beforehand.
-Nothing is simulated for it, but once for each error of the commands. Whether it is one is for real fits to say
-(`data_error_choice`).
+An error in the data is suspected if the corrected record has a higher evidence than the record as it is
+(`data_error_saturated_model`), with its density in the units in which it was written, and with the log prior of the
+error. Nothing is simulated for it, but once for each error of the commands. Fits with simulations decide whether it
+is an error (`data_error_choice`).
 """
 
 from __future__ import annotations
@@ -37,40 +37,46 @@ if TYPE_CHECKING:
 
 
 FEWEST = 6
-"""A channel with fewer samples says nothing."""
+"""A channel with fewer samples is not scanned."""
 LATEST_SHARE, CLOCK_STEP_S, LATEST_CHANNEL_S = 0.5, 0.5, 6.0
-"""Clocks are late by up to this share of the record, tried every so often; one channel by no more than that. [s]"""
+"""The latest clock, as a share of the record; step of the grid of clock offsets; the longest delay of one channel.
+[s]
+"""
 RATES, RATE_STEP = (0.02, 0.04, 0.06, 0.08, 0.1, 0.12, 0.14, 0.16, 0.18, 0.2), 0.02
 """By how much a clock may run too fast, or too slow. [-]"""
 CHANNEL_STEP_S = 1.0
-"""Delays of one channel are tried every so often: its lag and the clock are free about each. [s]"""
+"""Step of the grid of one channel's delays: its lag and the clock are free about each. [s]"""
 STEP_MARGIN = 0.1
-"""No step is looked for so close to the ends of a record, as a share of it: there it is a bias, or nothing."""
+"""No step is scanned so close to the ends of a record, as a share of it: there it is a bias, or unobservable."""
 STEP_TIMES, STEP_LEVELS = 40, 30.0
-"""A step in a sensor is looked for at so many times; its usual size in levels of the noise."""
+"""Number of times at which a step in a sensor is scanned; its usual size in levels of the noise."""
 LOUDEST = 6.0
-"""Noise of a sensor is never so many usual levels: what is louder in another unit is not in that unit. [-]"""
+"""Noise of a sensor is never so many usual levels: a channel whose noise is larger in another unit is not in that
+unit. [-]
+"""
 FREE_NUMBER_LOG_PRIOR = -5.0
-"""What it costs that a number (a delay, a rate, a size, a time) is fitted to the record."""
+"""Log prior of a number (a delay, a rate, a size, a time) that is fitted to the record."""
 LEAST_STEP_LEVELS = 4.0
-"""Least size of a step in a sensor, in levels of the noise with its rounding: less is a drift, or nothing."""
+"""Least size of a step in a sensor, in levels of the noise with its rounding: a smaller one is a drift, or none."""
 PEAKS = 4
-"""Of numbers that are tried on a grid so many are looked at closer."""
+"""Number of peaks on a grid of numbers that are refined."""
 UNREFINED = -8.0
-"""The number of an error that is less probable than that is left as it is."""
+"""The number of an error with lower log posterior odds is not refined."""
 FAR_BEHIND = 100.0
-"""What is so far behind the best suspect is not looked at closer."""
+"""A suspect that is so many nats less probable than the best is not refined."""
 HOPELESS = -30.0
-"""Nor is what is so much less probable than no error, with all of physics to help."""
+"""Nor is one with lower log odds against no error, under the saturated model."""
 FINEST = 0.02
-"""A number is found to this share of the step between those that were tried."""
+"""A number is refined to this share of the step of its grid."""
 AS_GOOD = 0.5
-"""The mean of a number is told in place of the best where that is no more than so much more probable."""
+"""The posterior mean of a number is reported instead of the best one where the best is more probable by no more than
+this.
+"""
 
 
 class Suspect(NamedTuple):
-    """An error in the data, and by how much the record is more probable with it (log posterior odds): with nothing else
-    or one cause, and with all of physics at once.
+    """An error in the data, and its log posterior odds against no error: with at most one cause, and under the
+    saturated model.
     """
 
     error: DataError
@@ -82,8 +88,8 @@ def suspects(saturated: SaturatedModel, trusted: frozenset[str] = frozenset()) -
     """Return the errors that would explain a record better, the most probable first.
 
     Args:
-        saturated: of the record.
-        trusted: channels that the user has said are right as they are.
+        saturated: the saturated model of the record.
+        trusted: channels that the user has declared to be free of errors.
     """
     rough = []
     for group in possible(saturated, trusted):
@@ -110,13 +116,13 @@ def suspects(saturated: SaturatedModel, trusted: frozenset[str] = frozenset()) -
 
 
 def judged_as_it_is(saturated: SaturatedModel, error: DataError) -> Suspect:
-    """Return how an error is judged in another record, or with others corrected."""
+    """Return the odds of an error in another record, or with others corrected."""
     return _judged(saturated, error, _group_of(saturated, error), closer=True)
 
 
 def clock_below_least(saturated: SaturatedModel) -> Suspect | None:
     """Return a clock that is late by less than an error, if that explains a record better than as it is, and than any
-    clock that is later: a cause like others, but one that the linear problem says little of.
+    clock that is later: a cause like others, but one for which the linear problem is inaccurate.
     """
     least, group = LEAST["late_clock"], Group([], is_read_off=True)
     judge = partial(_judged, saturated, group=group, closer=True)
@@ -137,13 +143,15 @@ def likeliest(saturated: SaturatedModel, errors: Sequence[DataError]) -> DataErr
 
 
 def judged_again(saturated: SaturatedModel, error: DataError) -> Suspect:
-    """Return the same with its numbers found anew."""
+    """Return the odds of an error with its numbers estimated again."""
     suspect, group = judged_as_it_is(saturated, error), _group_of(saturated, error)
     return _refined(saturated, suspect, group) if group.step or error.kind == "step" else suspect
 
 
 def _group_of(saturated: SaturatedModel, error: DataError) -> Group:
-    """Return the errors that share the probability of one, those that only the record itself tells by themselves."""
+    """Return the errors that share the prior probability of one; an error that is read off the record is alone in its
+    group.
+    """
     groups = possible(saturated, frozenset())
     found = (group for group in groups if any(suspect.id == error.id for suspect in group.each))
     return next(found, Group([error]))
@@ -157,7 +165,7 @@ def _is_known(error: DataError, known: Sequence[DataError]) -> bool:
 
 
 def _peaks(each: Sequence[Suspect]) -> list[Suspect]:
-    """Return those of a grid of numbers that are better than their neighbours, the best first."""
+    """Return the local maxima on a grid of numbers, the best first."""
     row = sorted(each, key=lambda error: error.error.amount)
     value = [-np.inf, *(error.generous for error in row), -np.inf]
     tops = [error for i, error in enumerate(row) if value[i + 1] >= max(value[i], value[i + 2])]
@@ -165,13 +173,13 @@ def _peaks(each: Sequence[Suspect]) -> list[Suspect]:
 
 
 def log_prior(error: DataError, alike: int) -> float:
-    """Return the log odds beforehand of an error, one of so many of its kind, against none."""
+    """Return the log prior odds of an error, one of so many of its kind, against none."""
     among = error.numbers * FREE_NUMBER_LOG_PRIOR if error.numbers else -np.log(max(alike, 1))
     return float(np.log(ANY * KINDS[error.kind].share / (1.0 - ANY)) + among)
 
 
 def _judged(saturated: SaturatedModel, error: DataError, group: Group, *, closer: bool = False) -> Suspect:
-    """Return by how much a record is more probable with an error in its data than without."""
+    """Return the log posterior odds of an error in the data of a record."""
     logged = saturated.without(error)
     is_of_all = error.is_of_clock or error.is_of_commands or not saturated.is_last(error)
     touched = list(saturated.own) if is_of_all else list(error.channels)
@@ -193,8 +201,8 @@ def _judged(saturated: SaturatedModel, error: DataError, group: Group, *, closer
 
 
 def _is_small(saturated: SaturatedModel, error: DataError) -> bool:
-    """Say whether the number of an error is too small to be one. Where a rounded channel stands still, what rounding
-    takes off is the same for long, and a step in the sensor of some of its resolution explains it.
+    """Say whether the number of an error is too small to be one. Where a rounded channel stands still, the rounding
+    error is constant for long, and a step in the sensor of a part of its resolution would explain it.
     """
     if error.kind != "step":
         return abs(error.amount) < LEAST.get(error.kind, 0.0)
@@ -204,8 +212,8 @@ def _is_small(saturated: SaturatedModel, error: DataError) -> bool:
 
 
 def _may_be_commanded(saturated: SaturatedModel, error: DataError) -> bool:
-    """Say whether the nominal model under other commands comes closer to a record: with the sensitivities under those
-    that are said to have been given, all of physics at once says little of others.
+    """Say whether the nominal model under other commands comes closer to a record: with the sensitivities under the
+    recorded commands, the saturated model is inaccurate for others.
     """
     if not error.is_of_commands:
         return False
@@ -219,8 +227,9 @@ def may_stand_still(saturated: SaturatedModel, error: DataError) -> bool:
 
 
 def _stuck(saturated: SaturatedModel, error: DataError, as_is: Evidence) -> float:
-    """Return what the values that a rounded channel repeats to the end add to the log evidence of the record as it is,
-    and the log odds that it is frozen, not standing still: where each value is an interval (`repeated_values`).
+    """Return the contribution to the log evidence of the record as it is of the values that a rounded channel repeats
+    to the end, and the log odds that it is frozen, not standing still: where each value is an interval
+    (`repeated_values`).
     """
     (name,) = error.channels
     logged = saturated.without(error)
@@ -236,8 +245,8 @@ def _stuck(saturated: SaturatedModel, error: DataError, as_is: Evidence) -> floa
 
 
 def _lost(saturated: SaturatedModel, error: DataError, terms: Mapping[str, Term], as_is: Evidence) -> float:
-    """Return what samples that are no measurements any more added to the evidence of the record as it is, on average;
-    of one that may only stand still, what these samples added, and the odds that it does not.
+    """Return the average contribution to the evidence of the record as it is of samples that are no measurements any
+    more; for a channel that may only stand still, the contribution of these samples, and the odds that it does not.
     """
     if may_stand_still(saturated, error):
         return _stuck(saturated, error, as_is)
@@ -247,7 +256,7 @@ def _lost(saturated: SaturatedModel, error: DataError, terms: Mapping[str, Term]
 
 
 def _refined(saturated: SaturatedModel, suspect: Suspect, group: Group) -> Suspect:
-    """Return an error with the numbers that are best close to those that were tried."""
+    """Return an error with its numbers refined around the best of the grid."""
     judge = partial(_judged, saturated, group=group, closer=True)
     if group.step:
         return best_number(judge, suspect, group.step)
@@ -265,8 +274,8 @@ def _refined(saturated: SaturatedModel, suspect: Suspect, group: Group) -> Suspe
 
 
 def best_number(judge: Callable[[DataError], Suspect], suspect: Suspect, step: float) -> Suspect:
-    """Return an error with the number between amount ± step that is judged best (golden section); where others are
-    about as good, with their mean.
+    """Return an error with the most probable number within amount ± step (golden section); with the posterior mean
+    where that is about as probable.
     """
     ratio = 0.5 * (np.sqrt(5.0) - 1.0)
 
@@ -291,7 +300,7 @@ def best_number(judge: Callable[[DataError], Suspect], suspect: Suspect, step: f
 
 
 def _mean_number(seen: Sequence[Suspect]) -> float:
-    """Return the mean of a number, by what is judged of some of its values (trapezoidal rule)."""
+    """Return the posterior mean of a number, from the odds at some of its values (trapezoidal rule)."""
     row = sorted({error.error.amount: error.lead for error in seen}.items())
     x, lead = np.array(row).T
     density = np.exp(lead - lead.max())
@@ -299,8 +308,8 @@ def _mean_number(seen: Sequence[Suspect]) -> float:
 
 
 class Group(NamedTuple):
-    """Errors of a kind that share its probability; `step` of a number that is tried on a grid, 0 if there is none;
-    whether that there is one of them is read off the record.
+    """Errors of a kind that share its prior probability; `step` of the grid of its number, 0 if there is none;
+    whether the record itself shows that there is one of them.
     """
 
     each: list[DataError]
@@ -342,7 +351,8 @@ def possible(saturated: SaturatedModel, trusted: frozenset[str]) -> list[Group]:
 def _is_quiet(saturated: SaturatedModel, error: DataError) -> bool:
     """Say whether a channel's noise from sample to sample is that of a sensor, once it is in the right unit.
 
-    Where the prediction fails, any unit that makes a record smaller than it would be as likely; but not its noise.
+    Where the prediction fails, any unit that makes the values smaller would be as likely; the noise differs between
+    units.
     """
     (name,) = error.channels
     record = error.corrected(saturated.logged).record
@@ -356,7 +366,7 @@ def _is_quiet(saturated: SaturatedModel, error: DataError) -> bool:
 
 
 def _jitter(values: np.ndarray) -> float:
-    """Return the standard deviation of white noise whose second differences are as large (median)."""
+    """Return the standard deviation of white noise with second differences of the same median size."""
     return 1.4826 * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6.0) if values.size > 2 else 0.0
 
 
@@ -396,7 +406,7 @@ def _different(logged: Logged, errors: Iterable[DataError]) -> list[DataError]:
 
 
 def _step(saturated: SaturatedModel, name: str) -> list[DataError]:
-    """Return the step in a sensor that explains most of what the generous fit leaves of its channel."""
+    """Return the step in a sensor that explains most of the residual of its channel in the saturated model."""
     record, here = saturated.logged.record, saturated.as_is
     values, time = record.values[name], record.time
     expected = saturated.at(saturated.nominal[name], time)

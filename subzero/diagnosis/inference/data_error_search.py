@@ -1,13 +1,14 @@
-"""Which errors in the data are suspected: a search forward and back, in the linear problem, before anything is fitted.
+"""Which errors in the data are suspected: a stepwise search forward and back, in the linear problem, before any fit.
 
-Forward: the best suspect of `data_error_scan` is corrected, and the scan goes on with the corrected record, until it
-finds none. Back: each error is judged again in its place, with all others corrected, and its numbers are found anew;
-what is not needed any more is dropped, the weakest first. So the first of two errors, which may have looked like
-something else while the second was there, is judged as the second is: by what it adds. A clock that is late by less
-than an error is a cause, but no linear one: where both explain more, errors are judged beside it.
+Forward: the best suspect of `data_error_scan` is corrected, and the scan is repeated on the corrected record, until
+it finds none. Back: each error is scored again at its place, with all others corrected, and its numbers are estimated
+again; errors that are not needed any more are dropped, the weakest first. So the first of two errors, which may have
+looked like something else while the second was there, is scored as the second is: by its own gain. A clock that is
+late by less than an error is a cause, but not a linear one: where both explain more, errors are scored with it
+included.
 
-How far physics comes towards a record without them is looked at before any search, too (`sparse_explanation`): an
-error of the data that is far ahead of that needs no search of the record as it is.
+How close physics comes to a record without them is also computed before any search (`sparse_explanation`): an error
+of the data that is far more probable than that needs no search of the record as it is.
 """
 
 from __future__ import annotations
@@ -38,31 +39,34 @@ from subzero.diagnosis.inference.repeated_values import may_be_measured, repeate
 from subzero.diagnosis.inference.sparse_explanation import most_of_one_cause, most_of_physics
 
 MOST_ERRORS = 3
-"""Of a record, beside values that are repeated."""
+"""Most errors of a record, not counting repeated values."""
 LEAST_LEAD, LEAST_SOFT_LEAD = 5.0, 15.0
-"""An error is suspected if a record is so much more probable with it, as a logarithm; the second of what is `SOFT`."""
+"""Least log posterior odds of a suspected error; the second is for kinds in `SOFT`."""
 SOFT = ("step", "late_clock", "clock_rate", "latency", "command_sign", "command_swap")
-"""Kinds with a number to be fitted, or that change the motion: something that broke in mid-trial may look like them."""
+"""Kinds with a number to be fitted, or that change the motion: a fault in mid-trial may look like them."""
 ALIKE_LEAD = 3.0
-"""Errors whose leads differ by less are told together."""
+"""Errors whose leads differ by less are reported together."""
 CLEAR_LEAD, CLEAR_GENEROUS_LEAD = 150.0, 40.0
-"""With a greater lead over physics, in the linear problem, an error needs no search of the record as it is: over
-nothing and every cause, and over all causes at once. The linear problem may err by tens of nats: where much more drag
-of the cable turned a dive by a degree the other way, a heading of the other sign had leads of 51 and 35, and its search
-ended 5.6 nats behind that of the record as it is."""
+"""With a greater lead over physics, in the linear problem, an error needs no search of the record as it is: over no
+cause and single causes, and over all causes at once. The linear problem may err by tens of nats: where much more drag
+of the cable turned a dive by a degree the other way, a heading of the other sign had leads of 51 and 35, and its
+search ended 5.6 nats below that of the record as it is.
+"""
 LEAST_SHARE = 0.5
-"""An error that something a vehicle does may look like needs no such search, either, if physics explains no more than
-the rest of what it does: the linear problem has missed a third of the evidence of a current of 0.3 m/s."""
+"""An error that physics can mimic needs no such search, either, if physics explains no more than the remaining share
+of its gain: the linear problem has missed a third of the evidence of a current of 0.3 m/s.
+"""
 SIGNATURE_LEAD = 200.0
-"""Lead of what is read off a record: it is clear."""
+"""Lead of an error that is read off a record: it is clear."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SuspectedError:
-    """An error of a record, its leads with all others corrected, and those that the record cannot tell from it; `left`
-    is the noise of the channel that is explained worst without all of them, in usual levels, with all of physics to
-    help; `excludes_physics` says that it leaves physics no chance in the linear problem; `may_stand_still` that a
-    channel that seems to be frozen is rounded; `is_read_off` that it is read off the record's values.
+    """An error of a record, its leads with all others corrected, and the errors that the record cannot distinguish
+    from it; `left` is the noise of the channel that is explained worst without all of them, in usual levels, under
+    the saturated model; `excludes_physics` says that physics is far less probable in the linear problem;
+    `may_stand_still` that a channel that seems to be frozen is rounded; `is_read_off` that it is read off the
+    record's values.
     """
 
     record: int
@@ -77,12 +81,12 @@ class SuspectedError:
 
 
 def mimicked_by_physics(error: SuspectedError) -> bool:
-    """Say whether something that a vehicle does may look like an error: not like one that the values tell."""
+    """Say whether physics can mimic an error: not one that is read off the values."""
     return error.error.kind in SOFT and not error.is_read_off
 
 
 def explain(errors: Sequence[SuspectedError]) -> bool:
-    """Say whether errors are all that the linear problem needs: what broke in mid-trial makes an error of a clock
+    """Say whether errors explain the records in the linear problem: a fault in mid-trial makes an error of a clock
     likely, too, but that leaves more than noise.
     """
     return all(error.left < LOUD for error in errors)
@@ -90,7 +94,7 @@ def explain(errors: Sequence[SuspectedError]) -> bool:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Suspects:
-    """What a scan of records says of errors in their data.
+    """Suspected errors in the data of records.
 
     Attributes:
         errors: that are suspected, in the order in which they are to be corrected.
@@ -99,7 +103,9 @@ class Suspects:
     errors: tuple[SuspectedError, ...]
 
     def first(self, count: int) -> tuple[SuspectedError, ...]:
-        """Return so many of them, in their order: first what is clear, then what no vehicle does, the best first."""
+        """Return `count` of them, in their order: the clear ones are chosen first, then those that no vehicle can
+        cause, the best first.
+        """
         ranked = sorted(
             self.errors,
             key=lambda error: (not error.excludes_physics, mimicked_by_physics(error), -error.lead),
@@ -108,29 +114,29 @@ class Suspects:
 
     @property
     def definite_count(self) -> int:
-        """How many of them leave physics no chance, or are what no vehicle does."""
+        """Number of errors that exclude physics, or that no vehicle can cause."""
         return sum(error.excludes_physics or not mimicked_by_physics(error) for error in self.errors)
 
     def fewer(self, count: int) -> list[tuple[SuspectedError, ...]]:
-        """Return the sets with less than so many of them: with one after the other of those that are not clear taken
-        away, and with none.
+        """Return the sets with fewer than `count` of them: those that are not clear are taken away one after the
+        other, down to none.
         """
         clear = sum(error.excludes_physics for error in self.errors)
         return [*(self.first(k) for k in reversed(range(max(clear, 1), count))), ()] if count else []
 
 
 def suspected(problem: Problem, records: Sequence[Logged]) -> Suspects:
-    """Return what errors the data of some records may have."""
+    """Return the errors that the data of some records may have."""
     each = [_of_record(problem, records, i) for i in range(len(records))]
     return Suspects(errors=tuple(error for found in each for error in found))
 
 
 Physics = Callable[[Problem, int], float]
-"""By how much something physical is more probable than nothing in one of the records of a problem. [nat]"""
+"""Log odds of a physical explanation against no cause in one of the records of a problem. [nat]"""
 
 
 class _Judged(NamedTuple):
-    """An error with its leads, and what the record cannot tell from it."""
+    """An error with its leads, and the errors that the record cannot distinguish from it."""
 
     suspect: Suspect
     alike: tuple[DataError, ...]
@@ -182,8 +188,8 @@ def _of_record(problem: Problem, records: Sequence[Logged], record: int) -> list
 def _with_clock_error(
     started: SaturatedModel, read_off: Sequence[DataError], found: list[_Judged], trusted: frozenset[str]
 ) -> tuple[SaturatedModel, list[_Judged]]:
-    """Return errors that came out one after the other, with what they are judged by: beside a clock that is late by
-    less than an error, where a vehicle may look like some of them, and that explains more.
+    """Return errors found one after the other, and the saturated model that they are scored in: with a clock that is
+    late by less than an error included, where physics can mimic some of them, and that explains more.
     """
     soft = any(error.suspect.error.kind in SOFT for error in found)
     clock = clock_below_least(started.after(read_off)) if soft else None
@@ -196,15 +202,15 @@ def _with_clock_error(
 
 
 def _total_lead(found: Sequence[_Judged]) -> float:
-    """Return by how much errors are more probable than none, each judged with those before it corrected."""
+    """Return the log odds of errors against none, each scored with those before it corrected."""
     return sum(error.suspect.lead for error in found)
 
 
 def _by_clock_of_others(
     started: SaturatedModel, read_off: Sequence[DataError], found: list[_Judged], trusted: frozenset[str]
 ) -> list[_Judged]:
-    """Return errors, or what comes out better with the clock of a channel that seems to be late besides: if most
-    channels say little, the one that is early by itself has set the clock of all.
+    """Return errors, or those found with the clock of a channel that also seems to be late, if they are more
+    probable: if most channels are uninformative, the one that is early by itself has set the clock of all.
     """
     clocks = [suspect.suspect.error for suspect in found if suspect.suspect.error.kind == "late_clock"]
     later = [suspect.suspect.error.amount for suspect in found if suspect.suspect.error.kind == "latency"]
@@ -221,7 +227,7 @@ def _forward(
     trusted: frozenset[str],
     first: Sequence[_Judged] = (),
 ) -> list[_Judged]:
-    """Return the errors that come out best one after the other, each with those before it corrected."""
+    """Return the most probable errors one after the other, each with those before it corrected."""
     found = [*first]
     for _ in range(MOST_ERRORS - len(found)):
         before = [*read_off, *(error.suspect.error for error in found)]
@@ -238,16 +244,16 @@ def _forward(
 
 
 def _adds_noise(started: SaturatedModel, before: Sequence[DataError], error: DataError) -> bool:
-    """Say whether a channel is no more that of a usual sensor without an error, and is with it: where a rounded heading
-    hardly leaves a value, radians explain its steps, and nothing else of it.
+    """Say whether the noise of a channel is no longer a usual sensor's once an error is corrected, and is with the
+    error left in: where a rounded heading hardly leaves a value, radians explain its steps, and nothing else of it.
     """
     scales, after = started.after(before).as_is.scales, started.after([*before, error]).as_is.scales
     return any(scales.get(name, 0.0) < LOUD <= after.get(name, 0.0) for name in error.channels)
 
 
 def _back(started: SaturatedModel, read_off: Sequence[DataError], found: list[_Judged]) -> list[_Judged]:
-    """Return the errors that are still needed with all others corrected, judged so."""
-    last = len(found) - 1  # is judged so already
+    """Return the errors that are still needed with all others corrected, scored so."""
+    last = len(found) - 1  # is scored so already
     while len(found) > 1:
         found = [error if i == last else _again(started, read_off, found, i) for i, error in enumerate(found)]
         weakest = min(found, key=lambda error: error.suspect.lead - _least(error.suspect))
@@ -264,8 +270,9 @@ def _closer(
     read_off: Sequence[DataError],
     found: list[_Judged],
 ) -> list[_Judged]:
-    """Return the errors that are still suspected where the problem is linear close to what explains the record without
-    them: far from the nominal model it errs by as much as a delay does. Of those of commands it is simulated anyway.
+    """Return the errors that are still suspected in the problem linearised around the explanation of the record
+    without them: far from the nominal model, a linearisation there errs by as much as a delay does. For errors of
+    commands it is simulated anyway.
     """
     errors = [*read_off, *(error.suspect.error for error in found)]
     if not any(error.kind in SOFT for error in errors) or any(error.is_of_commands for error in errors):
@@ -283,7 +290,7 @@ def _closer(
 def _again(
     started: SaturatedModel, read_off: Sequence[DataError], found: Sequence[_Judged], i: int
 ) -> _Judged:
-    """Return one of some errors, judged with all others corrected."""
+    """Return one of some errors, scored with all others corrected."""
     others = [error.suspect.error for k, error in enumerate(found) if k != i]
     after = started.after([*read_off, *others], len(read_off) + i)
     return found[i]._replace(suspect=judged_again(after, found[i].suspect.error))
@@ -291,17 +298,17 @@ def _again(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Against:
-    """The suspected errors of a record, in the order in which they are undone, and a few causes that they are held
-    against.
+    """The suspected errors of a record, in the order in which they are corrected, and their comparison with a few
+    causes.
 
     Attributes:
         problem: of all records, as posed.
         records: as they are.
         record: its number.
-        begun: its yardstick as it is.
+        started: the saturated model of the record as it is.
         errors: all of them.
         read_off: so many of them, the first, are read off the record's values.
-        kept: errors that were corrected → what some physics does beside them.
+        kept: errors that were corrected → the log odds of a physical explanation added to them.
     """
 
     problem: Problem
@@ -319,28 +326,28 @@ class _Against:
 
     @property
     def soft(self) -> list[DataError]:
-        """Those that something a vehicle does may look like."""
+        """Those that physics can mimic."""
         return [error for error in self.errors[self.read_off :] if error.kind in SOFT]
 
     def few_causes_explain_more(self) -> bool:
-        """Say whether soft errors, with a few causes beside them, are far behind a few causes in their place."""
+        """Say whether soft errors with a few causes are far less probable than a few causes in their place."""
         some = self.soft
-        beside = self._with_others(self.errors, most_of_physics) if some else 0.0
-        return bool(some) and self.lead(some, most_of_physics) + beside < -FAR_BEHIND
+        log_with_errors = self._with_others(self.errors, most_of_physics) if some else 0.0
+        return bool(some) and self.lead(some, most_of_physics) + log_with_errors < -FAR_BEHIND
 
     def lead_clearly(self, some: Sequence[DataError]) -> bool:
-        """Say whether some errors are far ahead of a few causes, and of one of any size, with all others corrected:
-        where these explain most of what the errors do, the rest may be what the linear problem does not know.
+        """Say whether some errors are far more probable than a few causes, and than one of any size, with all others
+        corrected: where causes explain most of the gain of the errors, the rest may be an error of the linearisation.
         """
         least = max(FAR_BEHIND, LEAST_SHARE * self._alone(some))
         return all(self.lead(some, physics) > least for physics in (most_of_physics, most_of_one_cause))
 
     def lead(self, some: Sequence[DataError], physics: Physics) -> float:
-        """Return by how much some errors are more probable than some physics, with all others corrected."""
+        """Return the log odds of some errors against a physical explanation, with all others corrected."""
         return self._alone(some) - self._with_others(self._others(some), physics)
 
     def _alone(self, some: Sequence[DataError]) -> float:
-        """Return by how much some errors are more probable than none, with all others corrected."""
+        """Return the log odds of some errors against none, with all others corrected."""
         held, lead = self._others(some), 0.0
         for error in some:
             place = sum(self._at(other) < self._at(error) for other in held)
@@ -355,7 +362,7 @@ class _Against:
         return next(i for i, other in enumerate(self.errors) if other is error)
 
     def _with_others(self, held: Sequence[DataError], physics: Physics) -> float:
-        """Return by how much some physics is more probable than the yardstick, where errors are corrected."""
+        """Return the log odds of a physical explanation against none, where errors are corrected."""
         key = (physics, tuple(self._at(error) for error in held))
         if key not in self.kept:
             after = self.started.after(held)
@@ -366,10 +373,10 @@ class _Against:
 
 
 def _clear(against: _Against, made: Sequence[Suspect]) -> list[DataError]:
-    """Return the errors that leave physics no chance in the linear problem. Those that a vehicle may look like must
-    also explain all that is there, and be far before a few causes together and each: what broke in mid-trial makes an
-    error of a clock likely, too. So may a rounded channel stand still since something broke. A step is never clear, as
-    a force or a drift may be as sudden.
+    """Return the errors that exclude physics in the linear problem. Those that physics can mimic must also explain
+    the whole record, and be far more probable than a few causes together and each of them: a fault in mid-trial makes
+    an error of a clock likely, too. Likewise a rounded channel may stand still since a fault. A step is never clear,
+    as a force or a drift may be as sudden.
     """
     soft = against.soft
     definite_count = [error for error in made if not any(error.error is each for each in soft)]

@@ -3,8 +3,8 @@
     w(t) = Σ c_j φ_j(t),   φ_j of `latent_force`;      c ~ N(0, (a/rms φ)²), amplitudes a mixed
     log p = log evidence of the sum (tolerances free) + log prior of its features and of their number
 
-The smoothed history enters only through what the data say of it (`ForceInformation`): nothing is fitted to a curve that
-was smoothed before.
+Only the information of the data on the history is used (`ForceInformation`): no formula is fitted to a curve that was
+smoothed before.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ NORMAL_95 = 1.96
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Formula:
-    """A short sum.
+    """A short sum of shapes.
 
     Attributes:
         axis: it acts on.
         shapes: its terms, the largest first.
-        coefficients: of each (columns of its shape,), with covariance, in the order of all columns.
-        covariance: of them (columns, columns).
-        log_gain: log evidence over that of no force; with what prior says of features.
+        coefficients: of each (columns of its shape,), in the order of its columns.
+        covariance: of all coefficients, in the order of all columns (columns, columns).
+        log_gain: log evidence over that of no force, with the log prior of its features.
         features: feature → probability that it belongs to the formula, most probable first.
     """
 
@@ -74,9 +74,9 @@ class Formula:
 
 
 FURTHER_TERM_PRIOR = 0.05
-"""Prior of a further term beside none."""
+"""Prior of a further term, relative to none."""
 BEAM_WIDTH, MAX_TERMS = 10, 3
-"""How many sums are carried on from one size to the next, and the most terms."""
+"""Number of sums that are carried on from one size to the next, and the most terms."""
 
 
 def describe(found: EstimatedForce) -> Formula:
@@ -99,7 +99,7 @@ def refined(
     to_knots: np.ndarray,
     amplitudes: Sequence[float],
 ) -> Formula:
-    """Return a formula with the edges of its windows on a finer grid; the probabilities of features stay."""
+    """Return a formula with the edges of its windows on a finer grid; the probabilities of features are unchanged."""
     times = SHAPE_STEP_S * np.arange(to_knots.shape[1])
     plain = {shape.feature: shape for shape in shapes if shape.is_plain}
     for shape in formula.shapes:
@@ -136,11 +136,11 @@ def choose(
     """Return the most probable sum of shapes.
 
     Args:
-        shapes: that are tried.
-        data: what the data say of the force at knots.
+        shapes: the candidates for terms.
+        data: the information of the data on the force at knots.
         to_knots: from samples to knots (knots, samples).
         axis: of the force.
-        amplitudes: that are mixed. [N, N m]
+        amplitudes: of the mixture. [N, N m]
     """
     scaled = [to_knots @ (shape.columns / size_of(shape)) for shape in shapes]
     scores: dict[tuple[int, ...], float] = {}
@@ -158,7 +158,7 @@ def choose(
 
 
 def _different(ranked: list[tuple[int, ...]], shapes: Sequence[Shape]) -> list[tuple[int, ...]]:
-    """Return the best sums, no more than two of the same features."""
+    """Return the best sums, at most two with the same features."""
     kept: list[tuple[int, ...]] = []
     counts: dict[tuple[str, ...], int] = {}
     for candidate in ranked:
@@ -193,7 +193,7 @@ def _log_prior(terms: Sequence[Shape], axis: str) -> float:
 
 
 def _own(chosen: tuple[int, ...], scaled: Sequence[np.ndarray], data: ForceInformation) -> ForceInformation:
-    """Return what the data say of the coefficients of a sum."""
+    """Return the information of the data on the coefficients of a sum."""
     phi = np.hstack([scaled[i] for i in chosen])
     return ForceInformation(phi.T @ data.M @ phi, phi.T @ data.q)
 

@@ -3,9 +3,9 @@
     w ~ Gaussian process(a, T) on one axis;   a and T are those that make the record most probable
 
 `latent_force_candidates` compares axes and channels in the linear problem around a fit. `estimate_force` fits the
-history with real simulations, all tolerances free, and gives its band. `relinearised_force` asks for the evidence again
-at that fit: without the force, all tolerances have to deviate from their priors to come close to a record, and a
-linearisation there says little of a model that is as declared but for the force. What is left out: forces on two axes.
+history with simulations, all tolerances free, and gives its band. `relinearised_force` computes the evidence again at
+that fit: without the force, all tolerances have to deviate from their priors to come close to a record, and a
+linearisation there is inaccurate for a model that is as declared but for the force. Not modelled: forces on two axes.
 """
 
 from __future__ import annotations
@@ -73,10 +73,10 @@ class LatentForceCandidate:
         id: "unknown_force:X", "sensor_drift:heading".
         log_gain: log evidence over that of none; amplitudes, correlation times, formulas of one term and κ mixed.
         kappa: the most probable κ.
-        fit: around which the linear problem is.
+        fit: the linearisation point.
         columns: sensitivities to the history at its knots (m, n).
         knots: of the history.
-        terms: axis → what a force on it may look like beside a process.
+        terms: axis → formulas of one term for a force on it, as alternatives to a process.
     """
 
     id: str
@@ -88,26 +88,28 @@ class LatentForceCandidate:
     terms: Mapping[str, Terms]
 
     def whitened_anew(self, before: Problem, after: Problem) -> LatentForceCandidate:
-        """Return what the noise of a problem has made white, made white by that of another."""
+        """Return the candidate, whitened with the noise of one problem, whitened with that of another."""
         fit, columns = rewhitened(self.fit, before, after), whitened_again(before, after, self.columns)
         return replace(self, fit=fit, columns=columns)
 
     def log_evidence(self, problem: Problem, causes: Ids) -> float:
-        """Return its log evidence beside causes, in the linear problem that the noise of a problem has made white."""
+        """Return its log evidence in addition to causes, in the linear problem whitened with the noise of a
+        problem.
+        """
         D = variances(problem.entries, causes, self.kappa)
         data = _seen(self.fit, D, self.columns)
         gain = _log_gain(problem, self.id, data, self.knots, self.terms)
         return posterior(self.fit.quadratic, D).log_evidence + gain
 
     def linear(self, problem: Problem, causes: Ids) -> tuple[Linear, np.ndarray]:
-        """Return its linear problem beside causes, with the modes of the most probable history, and the prior variances
-        of all that (k,).
+        """Return its linear problem in addition to causes, with the modes of the most probable history, and the prior
+        variances of all parameters (k,).
         """
         D, size = variances(problem.entries, causes, self.kappa), max(_amplitudes(problem, self.id))
         return self._with_modes(_best_modes(_seen(self.fit, D, self.columns), self.knots, size), D)
 
     def linear_at_most(self, problem: Problem, causes: Ids) -> tuple[Linear, np.ndarray]:
-        """Return the same with the modes of the largest and quickest history that there may be."""
+        """Return the same with the modes of the largest and quickest possible history."""
         largest = ProcessShape(max(_amplitudes(problem, self.id)), min(CORRELATION_TIMES))
         L = modes(self.knots.time, self.knots.record, largest)
         return self._with_modes(L, variances(problem.entries, causes, self.kappa))
@@ -125,15 +127,16 @@ def latent_force_candidates(
     knots: Knots,
     terms: Mapping[str, Terms] | None = None,
 ) -> list[LatentForceCandidate]:
-    """Return every force and drift of `columns` (id → (m, n)), in the linear problem around a fit, most probable first.
+    """Return every force and drift of `columns` (id → (m, n)), in the linear problem around a fit, most probable
+    first.
 
     Args:
         problem: of the columns.
         columns: as of `all_columns`.
-        fit: that the columns were made close to.
+        fit: the linearisation point, close to that of the columns.
         scales: κ → its log weight and the prior variances of the entries.
         knots: of the columns.
-        terms: axis → what a force on it may look like beside a process.
+        terms: axis → formulas of one term for a force on it, as alternatives to a process.
     """
     q, whole = fit.quadratic, fit.r + fit.J @ fit.z
     found = []
@@ -154,7 +157,9 @@ def latent_force_candidates(
 def _log_gain(
     problem: Problem, name: str, data: ForceInformation, knots: Knots, terms: Mapping[str, Terms]
 ) -> float:
-    """Return the log evidence of a force or a drift over that of none: a process, or as probably a formula."""
+    """Return the log evidence of a force or a drift over that of none: a process and a formula with equal priors,
+    mixed.
+    """
     amplitudes, axis = _amplitudes(problem, name), name.partition(":")[2]
     process = log_evidence_process(data, knots.time, knots.record, amplitudes, drift=name.startswith(DRIFT))
     if name.startswith(DRIFT) or axis not in terms:
@@ -163,7 +168,7 @@ def _log_gain(
 
 
 def _amplitudes(problem: Problem, name: str) -> list[float]:
-    """Return the amplitudes that are mixed for a force or a drift."""
+    """Return the amplitudes of the mixture for a force or a drift."""
     kind, _, which = name.partition(":")
     if kind + ":" == FORCE:
         return amplitude_grid(problem.records[0].setting, which)
@@ -171,7 +176,7 @@ def _amplitudes(problem: Problem, name: str) -> list[float]:
 
 
 def amplitude_grid(setting: Setting, axis: str) -> list[float]:
-    """Return the amplitudes that are mixed. [N, N m]"""
+    """Return the amplitudes of the mixture. [N, N m]"""
     return [share * typical_force(setting, axis) for share in AMPLITUDE_SHARES]
 
 
@@ -183,19 +188,19 @@ AMPLITUDES_TRIED = tuple(0.01 * 1.6**i for i in range(12))
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class EstimatedForce:
-    """A force that no cause explains, fitted.
+    """A latent force, fitted.
 
     Attributes:
         unknown: its history with a band, of the record where it is largest.
-        record: which one that is.
+        record: the number of that record.
         missing: the same as a part of a model.
-        problem: with the force's modes behind its entries; as it was for a drift.
+        problem: with the force's modes appended to its entries; unchanged for a drift.
         fit: of that problem.
         knots: of the history, all records.
         force: at the knots (n,). [N, N m]
         covariance: of these (n, n).
         columns: sensitivities to the force at the knots, around the fit (m, n).
-        data: what the data alone say of it there.
+        data: the information of the data alone on it there.
     """
 
     unknown: Unknown
@@ -223,11 +228,11 @@ def estimate_force(
 
     Args:
         problem: records and parameters.
-        fit: to begin with: of "nothing is wrong" within wide tolerances, or of named causes.
+        fit: the start: of "nothing is wrong" within wide tolerances, or of named causes.
         axis: X, Y, Z, K, M or N.
         D: prior variances of the problem's entries (k,); those of the fit if None.
         spacing: of the knots. [s]
-        most_fresh: how many times sensitivities may be made again on the way.
+        most_fresh: how many times sensitivities may be computed again on the way.
     """
     D = fit.D if D is None else D
     knots = knots_of(problem, spacing)
@@ -260,7 +265,9 @@ def estimate_drift(
 
 
 def _seen(fit: Fit, D: np.ndarray, columns: np.ndarray) -> ForceInformation:
-    """Return what data say of columns around a fit of the entries before them, or of those and the columns' modes."""
+    """Return the information of the data on columns around a fit of the entries before them, or of those and the
+    columns' modes.
+    """
     J, whole = fit.J[:, : D.size], fit.r + fit.J @ fit.z
     return seen(J.T @ J, J.T @ whole, D, J, columns, whole)
 
@@ -317,9 +324,9 @@ class RelinearisedForce(NamedTuple):
     """A force or a drift around its own fit.
 
     Attributes:
-        log_posterior: of it beside nothing, but for its own prior.
-        what: it is.
-        point: the linear problem there, without it, and the run, with it.
+        log_posterior: without causes, but for its own prior.
+        what: the candidate.
+        point: the linear problem there, without it, and the simulation, with it.
         is_poor: it does not explain the records.
     """
 
@@ -332,7 +339,7 @@ class RelinearisedForce(NamedTuple):
 def relinearised_force(
     problem: Problem, start: Fit, name: str, kappa: float, knots: Knots, terms: Mapping[str, Terms]
 ) -> RelinearisedForce:
-    """Return a force or a drift beside nothing, around its own fit.
+    """Return a force or a drift without causes, around its own fit.
 
     Args:
         problem: records and parameters.
@@ -340,7 +347,7 @@ def relinearised_force(
         name: "unknown_force:X", "sensor_drift:heading".
         kappa: how wide the tolerances are in the fit.
         knots: of its history.
-        terms: axis → what a force on it may look like.
+        terms: axis → formulas of one term for a force on it.
     """
     D, which = variances(problem.entries, (), kappa), name.partition(":")[2]
     if name.startswith(FORCE):
@@ -363,9 +370,10 @@ def linear_candidates(
     terms: Mapping[str, Terms],
     kappas: Sequence[float],
 ) -> list[tuple[float, LatentForceCandidate]]:
-    """Return the log posteriors of forces beside nothing in the linear problem around a fit, and the forces.
+    """Return the log posteriors of forces without causes in the linear problem around a fit, and the forces.
 
-    A fit says little of tolerances that are wider than its own: with them the model would rather bend.
+    A fit is a poor linearisation point for tolerances wider than its own: with those the model would rather deviate
+    from its priors.
     """
     D = {kappa: variances(problem.entries, (), kappa) for kappa in kappas}
     log = {
@@ -396,7 +404,9 @@ def fit_with_drift(problem: Problem, found: EstimatedForce, D: np.ndarray) -> Fi
 
 
 def _without(found: EstimatedForce, done: Fit, count: int) -> Fit:
-    """Return a fit with a force or beside a drift as one of the entries before it: with what the records lack then."""
+    """Return the fit of a problem with a force, or with a drift, as a fit of the entries before it: with the residual
+    without the force or drift.
+    """
     z, D, r = done.z[:count], done.D[:count], done.r + found.columns @ found.force
     objective = 0.5 * float(r @ r) + 0.5 * float(np.sum(z * z / D))
     return Fit(
@@ -412,6 +422,6 @@ def _without(found: EstimatedForce, done: Fit, count: int) -> Fit:
 
 
 def _possible(problem: Problem, done: Fit) -> float:
-    """Return what is added to the log evidence because some values cannot be below 0."""
+    """Return the correction of the log evidence because some values cannot be below 0."""
     count, free = len(problem.entries), posterior(done.quadratic, done.D)
     return possible(problem.entries, range(count), free.z[:count], np.sqrt(np.diag(free.M)[:count]))

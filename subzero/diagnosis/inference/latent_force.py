@@ -3,17 +3,17 @@
     w(t) = Σ f_k Λ((t − t_k)/Δ) on one axis,   f ~ a Gaussian process        (Λ: hat function)
 
 An effect like any other: its parameters are the knots f_k, or modes x of the process (f = L x, x ~ N(0, I)), so that
-sensitivities and fits are those of `problem` and `map_fit`. Records have histories of their own. A drift is the same in
-one channel, without a simulation. How probable either is, `input_estimation` finds.
+sensitivities and fits are those of `problem` and `map_fit`. Records have histories of their own. A drift is the same
+in one channel, without a simulation. `input_estimation` computes the evidence of both.
 
 A Gaussian process costs evidence for every second in which it is free to change; a drag that grows all the time, or a
-push that lasts for some seconds, is told by one number. So there is a dictionary of formulas, with prior probabilities:
+push that lasts for some seconds, has one number. So there is a dictionary of formulas, with prior probabilities:
 
     φ(t) = feature(state(t)) · window(t),     window = 1,  [t ≥ t₀],  [t₀ ≤ t < t₁],  Λ(t₀ … t₁),  exp(−t/T);
     or  cos ωt, sin ωt                        (Λ: rising to the middle, and falling)
 
-Features are those of `external_force`, along a fitted track; those that usually act along an axis have a larger prior.
-`one_terms` gives the formulas of one term.
+Features are those of `external_force`, along a fitted track; those that usually act along an axis have a larger
+prior. `one_terms` gives the formulas of one term.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from subzero.diagnosis.inference.problem import Problem
 
 COARSE_SPACING_S, FINE_SPACING_S = 2.0, 1.0
-"""Of knots: to look for a force, and to tell its history. [s]"""
+"""Spacing of the knots: to screen forces, and to estimate a history. [s]"""
 AXIS_WORDS = {
     "X": "forward force",
     "Y": "force to starboard",
@@ -52,24 +52,26 @@ AXIS_WORDS = {
     "M": "moment that raises the nose",
     "N": "moment that turns it to starboard",
 }
-"""What a positive force or moment does to the vehicle."""
+"""Effect of a positive force or moment on the vehicle."""
 FORCE, DRIFT = "unknown_force:", "sensor_drift:"
 MAX_DRIFT_LEVELS = 20.0
-"""A drift can be this many usual noise levels of the sensor; a wander of one level is noise."""
+"""Largest drift, in usual noise levels of the sensor; a wander of one level is noise."""
 SHAPE_STEP_S = 0.1
-"""Shapes are sampled so often. [s]"""
+"""Sampling step of shapes. [s]"""
 DECAY_TIMES_S = (3.0, 6.0, 12.0)
 """Times in which a force dies away. [s]"""
 WAVE_PERIODS_S = (1.5, 12.0)
-"""Of waves, the shortest and the longest; frequencies in between are a quarter of a turn of the trial apart. [s]"""
+"""Shortest and longest period of waves; frequencies in between are a quarter of a turn of the trial apart. [s]"""
 SWITCHED = ("constant", "u|u|", "n|n|", "n u", "rudder_angle*u2", "stern_plane*u2")
-"""Features that may begin, end or die away; what grows by itself (time, length, depth) or answers (sway) does not."""
+"""Features that may begin, end or die away; features that grow by themselves (time, length, depth) or respond (sway)
+do not.
+"""
 EDGE_NUDGES_S = (-0.8, -0.6, -0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8)
 """By how much edges of windows are moved in the end. [s]"""
 MIN_WINDOW_S = 1.0
 """No window is shorter. [s]"""
 ZERO_SIZE = 1e-9
-"""A shape that is nowhere larger is none."""
+"""A shape that is nowhere larger is zero."""
 
 
 class Knots(NamedTuple):
@@ -130,7 +132,7 @@ def force_effect(axis: str, times: np.ndarray, L: np.ndarray, size: float) -> Ef
 
 
 def with_force(problem: Problem, axis: str, knots: Knots, L: np.ndarray, size: float) -> Problem:
-    """Return the problem with a force's knots behind its entries, L (n, n) within each record."""
+    """Return the problem with a force's knots appended to its entries, L (n, n) within each record."""
     added: list[Entry] = []
     for record in range(len(problem.records)):
         own = knots.record == record
@@ -142,7 +144,7 @@ def with_force(problem: Problem, axis: str, knots: Knots, L: np.ndarray, size: f
 def force_columns(
     problem: Problem, z: np.ndarray, axes: Iterable[str], knots: Knots
 ) -> dict[str, np.ndarray]:
-    """Return axis → whitened sensitivities (m, n) of what is simulated to a force of 1 N (1 N m) at each knot, in rough
+    """Return axis → whitened sensitivities (m, n) of the simulation to a force of 1 N (1 N m) at each knot, in coarse
     steps.
     """
     axes, more, eye = list(axes), problem.roughly(z), np.eye(knots.time.size)
@@ -177,12 +179,12 @@ class Shape:
 
     Attributes:
         feature: of FEATURES, or WAVE.
-        words: what it is.
+        words: its description.
         columns: φ at the samples (n, 1), or (n, 2) for a wave.
         start, end: of its window; None if it holds throughout. [s]
         decay: time in which it dies away; 0 if it does not. [s]
         is_gradual: it rises and falls between start and end.
-        log_prior: how much less probable it is than its plain feature, by the number of its windows.
+        log_prior: relative to its plain feature, by the number of its windows.
     """
 
     feature: str
@@ -196,7 +198,7 @@ class Shape:
 
     @property
     def is_plain(self) -> bool:
-        """Whether it is a feature that holds throughout: what a model can have as a term."""
+        """Whether it is a feature that holds throughout, and so can be a term of a model."""
         return self.feature in FEATURES and self.start is None and self.decay == 0.0
 
 
@@ -241,7 +243,9 @@ def windowed(shape: Shape, times: np.ndarray, edges: np.ndarray) -> list[Shape]:
 
 
 def shifted(shape: Shape, plain: Shape, times: np.ndarray) -> list[Shape]:
-    """Return a windowed shape with its edges moved by less than the grid that they were found on, where it is not 0."""
+    """Return a windowed shape with its edges moved by less than the grid that they were found on, where it is
+    not 0.
+    """
     if shape.start is None or shape.decay:
         return [shape]
     starts = [shape.start + by for by in EDGE_NUDGES_S]
@@ -271,7 +275,7 @@ def _between(shape: Shape, times: np.ndarray, start: float, end: float | None, l
 
 
 def _gradual(shape: Shape, times: np.ndarray, start: float, end: float, log_prior: float) -> Shape:
-    """Return a shape that rises to the middle between two times and falls: few pushes begin and end at once."""
+    """Return a shape that rises to the middle between two times and falls: few pushes begin and end abruptly."""
     apart = np.abs(times - 0.5 * (start + end)) / (0.5 * (end - start))
     when = f"rising and falling from {start:g} to {end:g} s"
     return Shape(
@@ -347,10 +351,11 @@ SENSIBLE_FEATURES: Mapping[str, tuple[str, ...]] = {
     "M": ("uw", "uq", "constant", "stern_plane*u2", "q|q|", "u|u|"),
     "N": ("uv", "ur", "rudder_angle*u2", "r|r|", "constant", "u|u|", "n|n|"),
 }
-"""What usually acts along an axis, and what is therefore more probable beforehand."""
+"""Features that usually act along an axis, and therefore have a larger prior."""
 ODD_FEATURE_PRIOR, WAVE_PRIOR = 0.25, 0.01
-"""Priors of another feature, and of a wave, beside a sensible one. A swell gains 20 nats and more; the noise of a real
-sensor that swings a little gains 5."""
+"""Priors of another feature, and of a wave, relative to a usual one. A swell gains 20 nats and more; the noise of a
+real sensor that swings a little gains 5.
+"""
 
 
 def all_shapes(factors: np.ndarray, times: np.ndarray) -> list[Shape]:
@@ -369,7 +374,7 @@ def size_of(shape: Shape) -> float:
 
 
 def shape_weight(shape: Shape, axis: str) -> float:
-    """Return how probable a shape is along an axis beforehand, as a logarithm, but for a common constant."""
+    """Return the log prior of a shape along an axis, up to a common constant."""
     odd = WAVE_PRIOR if shape.feature == WAVE else ODD_FEATURE_PRIOR
     return shape.log_prior + (0.0 if shape.feature in SENSIBLE_FEATURES[axis] else float(np.log(odd)))
 
@@ -385,7 +390,9 @@ def one_terms(problem: Problem, z: np.ndarray, knots: Knots) -> Mapping[str, Ter
 def _of_record(
     problem: Problem, z: np.ndarray, knots: Knots, record: int
 ) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return the terms of a record at all knots (n, terms, 2), 0 in other records, and axis → log weights (terms,)."""
+    """Return the terms of a record at all knots (n, terms, 2), 0 in other records, and axis → log weights
+    (terms,).
+    """
     own = knots.record == record
     times = samples_of(float(knots.time[own][-1]))
     shapes = all_shapes(factors_along(problem.setting(record, z), times), times)
@@ -398,6 +405,6 @@ def _of_record(
 
 
 def _normal(weights: list[np.ndarray]) -> np.ndarray:
-    """Return log weights that sum to 1 in all."""
+    """Return log weights, normalised to a sum of weights of 1."""
     every = np.concatenate(weights)
     return every - log_sum(every)

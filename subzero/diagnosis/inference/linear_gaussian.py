@@ -1,15 +1,16 @@
-"""Evidence and posterior in the linear Gaussian problem: of parameters z, and of a Gaussian process f beside them.
+"""Evidence and posterior in the linear Gaussian problem: of parameters z, and of a Gaussian process f added to them.
 
     r = J z + e,   z ~ N(0, D),   e ~ N(0, I);      A = Jᵀ J,  b = Jᵀ r,  P = D⁻¹ + A
     log p = −½ (rᵀr − bᵀ P⁻¹ b) − ½ log det(D P)
 
-A hypothesis frees some entries: their variance becomes s² instead of (κτ)². That changes P on a few places of its
+A hypothesis frees some entries: their variance becomes s² instead of (κτ)². That changes P at a few places of its
 diagonal only, so that all pairs cost a few products of 2 × 2 matrices each.
 
     r = J z + C f + e,   f ~ N(0, a² R(T));      M = Cᵀ Σ₀⁻¹ C,   q = Cᵀ Σ₀⁻¹ r,   Σ₀ = I + J D Jᵀ
     log p(r | f) − log p(r | f = 0) = −½ log |I + a² R M| + ½ qᵀ (a⁻² R⁻¹ + M)⁻¹ q
 
-M and q are all that the data say of f, whatever its prior; amplitudes a and correlation times T are mixed.
+M and q are all the information of the data on f, whatever its prior; amplitudes a and correlation times T are
+marginalised over.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 
 KAPPAS = {1.0: 0.6, 2.0: 0.3, 4.0: 0.1}
-"""κ, how much wider than declared the tolerances are → its prior probability."""
+"""κ, the widening of the declared tolerances → its prior probability."""
 
 
 class Scale(NamedTuple):
@@ -32,7 +33,7 @@ class Scale(NamedTuple):
 
 
 Scales = Mapping[float, Scale]
-"""κ → what is made of it."""
+"""κ → its log probability and prior variances."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -57,8 +58,8 @@ class Quadratic:
 
 
 class Linear(NamedTuple):
-    """A linear problem around a fit: what is left if no parameter did anything, r + J z (m,), and J (m, k), both made
-    white by the noise of a problem.
+    """A linear problem around a fit: the residual with all parameters at 0, r + J z (m,), and J (m, k), both whitened
+    with the noise of a problem.
     """
 
     whole: np.ndarray
@@ -66,7 +67,7 @@ class Linear(NamedTuple):
 
     @property
     def quadratic(self) -> Quadratic:
-        """The same, as far as parameters are concerned."""
+        """The same as products with Jᵀ, whose size is that of the parameters."""
         whole, J = self
         return Quadratic(A=J.T @ J, b=J.T @ whole, rr=float(whole @ whole))
 
@@ -82,8 +83,8 @@ class Posterior:
 
 
 def precision(A: np.ndarray, root: np.ndarray) -> np.ndarray:
-    """Return I + √D A √D (k, k), given A = JᵀJ (k, k) and √D (k,), with what rounding may have taken from it on its
-    diagonal: sensitivities of a million levels of the noise leave no room for the 1 of the prior.
+    """Return I + √D A √D (k, k), given A = JᵀJ (k, k) and √D (k,), with its rounding error added to the diagonal:
+    with sensitivities of a million levels of the noise, the 1 of the prior is lost to rounding.
     """
     scaled = root[:, None] * A * root
     scaled.ravel()[:: root.size + 1] += 1.0 + root.size * np.finfo(float).eps * np.trace(scaled)
@@ -91,7 +92,7 @@ def precision(A: np.ndarray, root: np.ndarray) -> np.ndarray:
 
 
 def posterior(q: Quadratic, D: np.ndarray) -> Posterior:
-    """Return what the data say under prior variances D (k,)."""
+    """Return the posterior under prior variances D (k,)."""
     root = np.sqrt(D)
     factor = np.linalg.cholesky(precision(q.A, root))
     half = np.linalg.solve(factor, np.diag(root))
@@ -104,17 +105,18 @@ def posterior(q: Quadratic, D: np.ndarray) -> Posterior:
 def log_beyond(
     mean: np.ndarray, variance: np.ndarray, prior: np.ndarray, within: np.ndarray, sizes: Sequence[int]
 ) -> np.ndarray:
-    """Return what is added to a log evidence (…) made with normal priors if what calibration may do is no cause:
+    """Return the correction of a log evidence (…) with normal priors if deviations within calibration are no cause:
 
         p(z) ∝ N(z; 0, s²) (1 − exp(−½ z²/w²)),
         log p(y) − log p_normal(y) = log (1 − E[exp(−½ z²/w²) | y]) − log (1 − E[exp(−½ z²/w²)]).
 
-    So a cause that surely does next to nothing is none; one that is not seen, or is large, is as before: a non-local
-    prior (Johnson & Rossell 2010) with the tails of the normal. Parameters are taken to be independent, given the data.
+    So a cause that is surely close to 0 is none; one that the data do not constrain, or that is large, is unaffected:
+    a non-local prior (Johnson & Rossell 2010) with the tails of the normal. Parameters are taken to be independent,
+    given the data.
 
     Args:
         mean: of the causes' parameters under normal priors, one cause after the other (…, k).
-        variance: theirs (…, k).
+        variance: of these parameters (…, k).
         prior: s² (…, k).
         within: w² (…, k).
         sizes: how many parameters each cause has.
@@ -123,24 +125,25 @@ def log_beyond(
         return np.zeros(mean.shape[:-1])
     first = np.cumsum([0, *sizes[:-1]])
 
-    def log_outside(mean: np.ndarray, variance: np.ndarray) -> np.ndarray:
+    def log_off_calibration(mean: np.ndarray, variance: np.ndarray) -> np.ndarray:
         log = -0.5 * (np.log1p(variance / within) + mean**2 / (within + variance))
         inside = np.minimum(np.add.reduceat(log, first, axis=-1), -np.finfo(float).tiny)
         return np.sum(np.log(-np.expm1(inside)), axis=-1)
 
-    return log_outside(mean, variance) - log_outside(np.zeros_like(mean), prior)
+    return log_off_calibration(mean, variance) - log_off_calibration(np.zeros_like(mean), prior)
 
 
 def freed(
     base: Posterior, D: np.ndarray, places: Sequence[int] | np.ndarray, variance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return log evidence (…), means (…, p) and covariance (…, p, p) of p entries when their prior variance is another.
+    """Return log evidence (…), means (…, p) and covariance (…, p, p) of p entries when their prior variances are
+    replaced.
 
     Args:
         base: under D.
         D: prior variances (k,).
-        places: of the entries (…, p): of several hypotheses at once, if asked.
-        variance: theirs, instead (…, p).
+        places: of the entries (…, p), of one or several hypotheses.
+        variance: their new prior variances (…, p).
     """
     at = np.asarray(places)
     change, eye = 1.0 / variance - 1.0 / D[at], np.eye(at.shape[-1])
@@ -157,8 +160,8 @@ def freed(
 def each_freed(
     base: Posterior, D: np.ndarray, places: Sequence[Sequence[int]], wide: np.ndarray
 ) -> np.ndarray:
-    """Return the log evidence (hypotheses,) when the entries of each hypothesis, so many as it has, get the prior
-    variances that are wide (k,).
+    """Return the log evidence (hypotheses,) when the entries of each hypothesis, any number of them, get the prior
+    variances `wide` (k,).
     """
     found, sizes = np.empty(len(places)), np.array([len(place) for place in places])
     for size in set(sizes.tolist()):
@@ -169,13 +172,13 @@ def each_freed(
 
 
 def discrimination(G: np.ndarray, step: np.ndarray, free: np.ndarray) -> float:
-    """Return the squared distance of a step from what other entries could do instead.
+    """Return the squared distance of a step from the closest response of other entries.
 
     Args:
         G: information of all k entries, tolerances of all included as 1/D on its diagonal but for those in the step's
             own and the rival's places (k, k).
         step: deviations of the true cause (k,), 0 elsewhere.
-        free: which entries may answer (k,).
+        free: which entries may respond (k,).
     """
     own = G @ step
     answer = np.linalg.solve(G[np.ix_(free, free)], own[free])
@@ -195,24 +198,24 @@ def log_sum(values: Sequence[float] | np.ndarray) -> float:
 
 
 CORRELATION_TIMES = (2.0, 6.0)
-"""T of the mixture: a force that changes within seconds, or lasts. [s]"""
+"""Correlation times T of the mixture: a force that changes within seconds, or lasts. [s]"""
 DRIFT_TIMES = (10.0, 30.0)
-"""The same of a sensor's drift, which is slow: one that follows every step of a force is no drift. [s]"""
+"""The same for a sensor's drift, which is slow: one that follows every step of a force is no drift. [s]"""
 AMPLITUDE_SHARES = (0.1, 0.3, 1.0)
 """Amplitudes of the mixture, in units of the axis' usual force: smaller ones are of no practical size."""
 JITTER = 1e-6
 
 
 class ForceInformation(NamedTuple):
-    """What data say of the coefficients f of columns: information M (n, n) and q (n,), tolerances free."""
+    """Information of the data on the coefficients f of columns: M (n, n) and q (n,), tolerances marginalised."""
 
     M: np.ndarray
     q: np.ndarray
 
 
 class Terms(NamedTuple):
-    """What a force may look like, as formulas of one term: values at the knots (n, terms, 2), of size 1, and log prior.
-    A wave has two columns, for its phase; of other terms the second is 0.
+    """Formulas of one term for a force: values at the knots (n, terms, 2), of size 1, and log prior. A wave has two
+    columns, for its phase; of other terms the second is 0.
     """
 
     phi: np.ndarray
@@ -229,7 +232,7 @@ class ProcessShape(NamedTuple):
 def seen(
     A: np.ndarray, b: np.ndarray, D: np.ndarray, J: np.ndarray, columns: np.ndarray, r: np.ndarray
 ) -> ForceInformation:
-    """Return what the data say of columns, all other entries free under D.
+    """Return the information of the data on columns, all other entries marginalised under D.
 
     Args:
         A: JᵀJ (k, k).
@@ -248,7 +251,7 @@ def seen(
 
 
 def correlation(times: np.ndarray, groups: np.ndarray, time: float, *, smooth: bool = False) -> np.ndarray:
-    """Return R (n, n) between knots: exp(−|Δt|/T), or Matérn's with two derivatives for what never jumps.
+    """Return R (n, n) between knots: exp(−|Δt|/T), or Matérn's with two derivatives for a history that never jumps.
 
     Knots of different groups (records) have nothing in common.
     """
@@ -275,7 +278,7 @@ def log_evidence_process(
     *,
     drift: bool = False,
 ) -> float:
-    """Return the log evidence of a process over that of f = 0, amplitudes and correlation times mixed."""
+    """Return the log evidence of a process over that of f = 0, amplitudes and correlation times marginalised over."""
     lasting = DRIFT_TIMES if drift else CORRELATION_TIMES
     table = np.array(
         [log_gains(data, correlation(times, groups, T, smooth=drift), amplitudes) for T in lasting]
@@ -284,7 +287,9 @@ def log_evidence_process(
 
 
 def log_evidence_term(data: ForceInformation, terms: Terms, amplitudes: Sequence[float]) -> float:
-    """Return the log evidence of f = φ c over that of f = 0, c ~ N(0, a² I); terms and amplitudes mixed."""
+    """Return the log evidence of f = φ c over that of f = 0, c ~ N(0, a² I); terms and amplitudes
+    marginalised over.
+    """
     first, second = terms.phi[:, :, 0], terms.phi[:, :, 1]
     M1, M2 = data.M @ first, data.M @ second
     m11, m12, m22 = np.sum(first * M1, axis=0), np.sum(first * M2, axis=0), np.sum(second * M2, axis=0)

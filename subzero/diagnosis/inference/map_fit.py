@@ -1,15 +1,16 @@
-"""The MAP fit of a hypothesis with real simulations, by bounded, damped Gauss-Newton with Broyden updates; and the
-evidence around it, by Laplace's method, mixed over κ.
+"""The MAP fit of a hypothesis with real simulations, by bounded, damped Gauss-Newton with Broyden updates; and its
+evidence, by Laplace's method, mixed over κ.
 
     objective = ½ |r(z)|² + ½ zᵀ D⁻¹ z,   low ≤ z ≤ high
     log p(y | κ) = −objective(ẑ) − ½ log det (D P),   P = D⁻¹ + Jᵀ J;      log p(y) = log Σ_κ p(κ) p(y | κ)
 
-A step is the best of the linear model within bounds, or the part of it that gains, and its broyden_update updates J.
+A step is the optimum of the linear model within bounds, or the part of it that gains; `broyden_update` updates J
+after it.
 
 Where a drum stops, a cable falls slack or a gear has play, simulations have non-smooth points, and a fit may end in a
-local minimum beyond one. `restarted_where_smooth` fits once more with all one-sided parameters as they are in most
-vehicles, but for those of named causes. `fit_wide` is the fit with κ = 4, close to the records whatever is wrong; the
-noise is estimated behind it.
+local minimum beyond one. `restarted_where_smooth` fits once more from values of the one-sided parameters that most
+vehicles have, but for those of named causes. `fit_wide` (`screening`) is the fit with κ = 4, close to the records
+whatever is wrong; the noise is estimated from its residual.
 """
 
 from __future__ import annotations
@@ -46,12 +47,12 @@ if TYPE_CHECKING:
     from subzero.diagnosis.inference.problem import Problem
 
 POOR_FIT_SIGMAS = 2.0
-"""A fit whose sum of squares is this many of its standard deviations above that of noise is poor."""
+"""A fit is poor if its sum of squares is this many standard deviations above that of noise."""
 
 
 class Step(NamedTuple):
-    """A step: what the linear model predicted, and promises of what is left; the share of it that was gained; where it
-    leads, the residual and the objective there.
+    """A step: the largest gain that the linear model predicted; the gain that it predicted for the last step tried;
+    the share of that which was achieved; the new point, with its residual and objective.
     """
 
     predicted: float
@@ -65,8 +66,8 @@ class Step(NamedTuple):
 def damped_step(
     problem: Problem, z: np.ndarray, r: np.ndarray, now: float, J: np.ndarray, D: np.ndarray
 ) -> Step:
-    """Return the step that is best for the linear model within bounds; if that gains nothing, the one that holds what
-    has kinks; none where no more than settings.NEGLIGIBLE_GAIN_NATS is predicted.
+    """Return the optimal step of the linear model within bounds; if that gains nothing, the one with the non-smooth
+    entries held; none where no more than settings.NEGLIGIBLE_GAIN_NATS is predicted.
     """
     low, high = bounds(problem)
     predicted = 0.0
@@ -83,15 +84,16 @@ def damped_step(
 
 
 def _held(z: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return bounds that hold where they are all entries that are possible on one side only: where a drum stops, a
-    cable falls slack or a gear has play, runs have kinks, and a step across one spoils what the others would gain.
+    """Return bounds that hold all one-sided entries at their present values: where a drum stops, a cable falls slack
+    or a gear has play, simulations have non-smooth points, and a step across one spoils the gain of the other
+    entries.
     """
     one_sided = low == 0.0
     return np.where(one_sided, z, low), np.where(one_sided, z, high)
 
 
 def broyden_update(J: np.ndarray, step: np.ndarray, change: np.ndarray, D: np.ndarray) -> np.ndarray:
-    """Return sensitivities that explain the change of the residual along a step, otherwise as they were (Broyden
+    """Return sensitivities that explain the change of the residual along a step, and are otherwise unchanged (Broyden
     1965), with steps measured in prior deviations: J + (−Δr − J s) (D⁻¹s)ᵀ/(sᵀD⁻¹s).
     """
     weighted = step / D
@@ -107,7 +109,7 @@ def _walk(
     predicted: float,
     D: np.ndarray,
 ) -> tuple[float, np.ndarray, np.ndarray, float]:
-    """Return the share of what was predicted that a step, or a part of it, gains; and where it leads."""
+    """Return the share of the predicted gain that a step, or a part of it, achieves; and the new point."""
     for part in (1.0, 0.4, 0.1):
         there = z + part * step
         r_there = problem.residual(there)
@@ -118,7 +120,7 @@ def _walk(
 
 
 def objective(r: np.ndarray, z: np.ndarray, D: np.ndarray) -> float:
-    """Return ½|r|² + ½ zᵀD⁻¹z, infinite for a run that could not go on."""
+    """Return ½|r|² + ½ zᵀD⁻¹z, infinite for a simulation that failed."""
     value = 0.5 * float(r @ r) + 0.5 * float(np.sum(z * z / D))
     return value if np.isfinite(value) else np.inf
 
@@ -133,15 +135,17 @@ def bounds(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
 def bounded_step(
     J: np.ndarray, r: np.ndarray, z: np.ndarray, D: np.ndarray, low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """Return the step that is best for the linear model within bounds: entries that would leave are held there, and
-    let go again when they want to come back.
+    """Return the optimal step of the linear model within bounds (active set): entries that would leave are held at
+    their bound, and released when their gradient points inwards.
     """
     P, g = J.T @ J + np.diag(1.0 / D), J.T @ r - z / D
     return quadratic_step(P, g, low - z, high - z)
 
 
 def quadratic_step(P: np.ndarray, g: np.ndarray, least: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """Return argmin ½ xᵀPx − gᵀx with least ≤ x ≤ most, by holding and letting go."""
+    """Return argmin ½ xᵀPx − gᵀx with least ≤ x ≤ most, by holding entries at bounds and releasing them
+    (active set).
+    """
     x, held = np.zeros_like(g), np.zeros(g.size, dtype=bool)
     for _ in range(20):
         free = ~held
@@ -163,14 +167,14 @@ class Fit:
 
     Attributes:
         z: deviations (k,).
-        r: whitened residual there (m,).
-        J: sensitivities there, or close by (m, k).
+        r: whitened residual at z (m,).
+        J: sensitivities at z, or close by (m, k).
         D: prior variances (k,).
         objective: ½|r|² + ½ zᵀD⁻¹z.
         converged: no step would gain more.
-        predicted_gain: what the linear model says a further step would gain; of old sensitivities, little to rely on.
-        fresh: how many times sensitivities were made.
-        made_at: deviations that the sensitivities were made at, if that is known (k,).
+        predicted_gain: of a further step by the linear model; unreliable with old sensitivities.
+        fresh: how many times sensitivities were computed.
+        made_at: linearisation point of the sensitivities, if that is known (k,).
     """
 
     z: np.ndarray
@@ -189,7 +193,9 @@ class Fit:
         return Quadratic.at(self.z, self.r, self.J)
 
     def moved(self, problem: Problem) -> float:
-        """Return how far it is from where its sensitivities were made, in tolerances; infinite if that is not known."""
+        """Return the distance from the linearisation point of its sensitivities, in tolerances; infinite if that is
+        not known.
+        """
         if self.made_at is None:
             return np.inf
         tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
@@ -203,14 +209,18 @@ def is_poor_fit(fit: Fit) -> bool:
 
 
 def with_own_jacobian(problem: Problem, fit: Fit) -> Fit:
-    """Return a fit again with sensitivities of its own, if it has moved from where its sensitivities were made."""
+    """Return a fit repeated with sensitivities of its own, if it has moved from the linearisation point of its
+    sensitivities.
+    """
     if fit.moved(problem) < settings.OWN_JACOBIAN_TOLERANCES:
         return fit
     return refit(problem, fit.z, problem.jacobian(fit.z), fit.D, r=fit.r, most_fresh=0, made_at=fit.z)
 
 
 def continued(problem: Problem, fit: Fit) -> Fit:
-    """Return a fit that has gone on, with sensitivities of its own, while much is predicted, and some of it gained."""
+    """Return a fit continued, with sensitivities of its own, while a large gain is predicted and some of it
+    achieved.
+    """
     for _ in range(settings.MAX_TRIED):
         if fit.predicted_gain < settings.DECISIVE_NATS:
             break
@@ -235,12 +245,12 @@ def refit(
 
     Args:
         problem: records and parameters.
-        z: where to begin (k,).
-        J: sensitivities to begin with (m, k).
+        z: the start (k,).
+        J: sensitivities at the start (m, k).
         D: prior variances (k,).
         r: the residual at z, if it is known.
-        most_fresh: how many times sensitivities may be made again.
-        made_at: where J was made (k,).
+        most_fresh: how many times sensitivities may be computed again.
+        made_at: linearisation point of J (k,).
     """
     z, r = runnable(problem, np.clip(z, *bounds(problem)), r)
     now, fresh, converged, left = objective(r, z, D), 0, False, 0.0
@@ -272,7 +282,7 @@ def refit(
 
 
 def runnable(problem: Problem, z: np.ndarray, r: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """Return z, or what is nearer to the nominal model if that cannot be run, and the residual there."""
+    """Return z, or a point nearer to the nominal model if the simulation at z fails, and the residual there."""
     r = problem.residual(z) if r is None else r
     for share in (0.5, 0.2, 0.0):
         if np.isfinite(r).all():
@@ -283,8 +293,8 @@ def runnable(problem: Problem, z: np.ndarray, r: np.ndarray | None) -> tuple[np.
 
 
 def non_smooth(problem: Problem, but: Ids) -> list[int]:
-    """Return the entries of causes on one side only, but for sensors' and some causes': drums stop, cables fall slack,
-    gears have play.
+    """Return the entries of one-sided causes, except those of sensors and of the causes `but`: drums stop, cables
+    fall slack, gears have play.
     """
     return [
         k
@@ -297,14 +307,17 @@ def non_smooth(problem: Problem, but: Ids) -> list[int]:
 
 
 def at_bad_minimum(problem: Problem, fit: Fit, ids: Ids) -> bool:
-    """Say whether the fit of a hypothesis bends what has kinks farther than it should."""
+    """Say whether the fit of a hypothesis moves non-smooth parameters of no named cause by more than
+    STRAYED_TOLERANCES.
+    """
     at = non_smooth(problem, ids)
     tolerance = np.array([problem.entries[k].parameter.tolerance for k in at])
     return bool(np.any(np.abs(fit.z[at]) > settings.STRAYED_TOLERANCES * tolerance))
 
 
 def restarted_where_smooth(problem: Problem, fit: Fit, ids: Ids, D: np.ndarray | None = None) -> Fit:
-    """Return the fit of a hypothesis from where what has kinks is RESTART_TOLERANCES, and all else best for that.
+    """Return the fit of a hypothesis, started with non-smooth parameters at RESTART_TOLERANCES and the optimum of all
+    others given these.
 
     Args:
         problem: records and parameters.
@@ -316,12 +329,12 @@ def restarted_where_smooth(problem: Problem, fit: Fit, ids: Ids, D: np.ndarray |
     low, high = bounds(problem)
     low[at] = high[at] = [settings.RESTART_TOLERANCES * problem.entries[k].parameter.tolerance for k in at]
     z = fit.z + bounded_step(fit.J, fit.r, fit.z, D, low, high)
-    return refit(problem, z, _across_kinks(problem, fit, z, at), D, most_fresh=1)
+    return refit(problem, z, _with_slopes_at_restart(problem, fit, z, at), D, most_fresh=1)
 
 
-def _across_kinks(problem: Problem, fit: Fit, z: np.ndarray, at: list[int]) -> np.ndarray:
-    """Return the sensitivities (m, k) of a fit with new ones at z to what has kinks, if it has not moved far from where
-    the others were made; else all of them at z.
+def _with_slopes_at_restart(problem: Problem, fit: Fit, z: np.ndarray, at: list[int]) -> np.ndarray:
+    """Return the sensitivities (m, k) of a fit with new ones at z to the non-smooth entries, if z is close to the
+    linearisation point of the others; else all of them at z.
     """
     if fit.moved(problem) > settings.JACOBIAN_HOLDS_TOLERANCES:
         return problem.jacobian(z)
@@ -332,7 +345,7 @@ def _across_kinks(problem: Problem, fit: Fit, z: np.ndarray, at: list[int]) -> n
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Candidate:
-    """A hypothesis with a real fit.
+    """A hypothesis with a fit by simulations.
 
     Attributes:
         ids: its causes.
@@ -348,7 +361,7 @@ class Candidate:
 
     @property
     def optimistic_log_posterior(self) -> float:
-        """The log posterior that a better fit might have."""
+        """The log posterior with the predicted gain of a further step."""
         return self.log_posterior + min(self.fit.predicted_gain, settings.MAX_PREDICTED_GAIN_NATS)
 
     @property
@@ -357,7 +370,9 @@ class Candidate:
         return log_sum([np.log(prior) + self.log_evidence[kappa] for kappa, prior in KAPPAS.items()])
 
     def scales(self, problem: Problem) -> Scales:
-        """Return what the hypothesis makes of κ: what else there is may be what asked for a wide one."""
+        """Return κ with its probability given the hypothesis and its prior variances: an explanation that is added
+        may make a wide κ needless.
+        """
         return {
             kappa: Scale(
                 float(np.log(prior)) + self.log_evidence[kappa] - self.log_mixed,
@@ -399,15 +414,15 @@ def laplace(
     causes: Sequence[Sequence[int]],
     practical: float,
 ) -> dict[float, float]:
-    """Return κ → log evidence under prior variances (k,): that of the linear problem, moved to what the real run leaves
-    under the fit's own κ.
+    """Return κ → log evidence under prior variances (k,): that of the linear problem, shifted so that under the fit's
+    own κ it agrees with the residual of the simulation.
 
     Args:
         entries: of z.
         fit: the best one.
         under: κ → prior variances.
-        causes: places of the parameters of each.
-        practical: size from which on they are causes. [κτ]
+        causes: places of the parameters of each cause.
+        practical: least size of a cause. [κτ]
     """
     q = fit.quadratic
     found = {kappa: posterior(q, D) for kappa, D in under.items()}
@@ -430,14 +445,14 @@ def of_sizes(
     causes: Sequence[Sequence[int]],
     practical: float,
 ) -> float:
-    """Return what is added to a log evidence because what calibration may do is no cause (`log_beyond`).
+    """Return the correction of a log evidence because deviations within calibration are no cause (`log_beyond`).
 
     Args:
         entries: of z.
-        said: what the data say of them under normal priors.
-        D: the variances of these (k,).
-        causes: places of the parameters of each.
-        practical: size from which on they are causes. [τ]
+        said: their posterior under normal priors.
+        D: the variances of these priors (k,).
+        causes: places of the parameters of each cause.
+        practical: least size of a cause. [τ]
     """
     at = [k for own in causes for k in own]
     within = np.array([(practical * entries[k].parameter.tolerance) ** 2 for k in at])
@@ -448,8 +463,8 @@ def of_sizes(
 def possible(
     entries: Sequence[Entry], at: Sequence[int], mean: np.ndarray, sd: np.ndarray, *, held: bool = False
 ) -> float:
-    """Return what is added to a log evidence because values below a bound at 0 are not possible; `held` if it was
-    taken at the best values within bounds.
+    """Return the correction of a log evidence because values below a bound at 0 are not possible; `held` if the
+    evidence was computed at the optimum within bounds.
     """
     bounded = np.array([entries[k].parameter.low == 0.0 for k in at])
     if not bounded.any():

@@ -11,8 +11,8 @@ cause_named        one hypothesis, or one cause that begins in mid-trial, with p
 outside_catalogue  a latent force or a drift that no cause explains has p ≥ 0.9
 undecided          everything else: the smallest set with p ≥ 0.95
 
-Hypotheses with a fit have Laplace's evidence; all others that of the screening, never ahead of the best fit. A further
-cause counts only if it could be named (Occam fold).
+Hypotheses with a fit have Laplace's evidence; all others that of the screening, never higher than that of the best
+fit. A further cause counts only if it could be named (Occam fold).
 """
 
 from __future__ import annotations
@@ -42,11 +42,17 @@ if TYPE_CHECKING:
 
 Key = TypeVar("Key")
 NAMED_PROBABILITY, HEALTHY_PROBABILITY, CREDIBLE_SET_PROBABILITY = 0.9, 0.5, 0.95
-"""A cause, a force, a drift or an error in the data is told from the first on: one in ten may be wrong there. [-]"""
+"""Probabilities from which on a cause, a force, a drift or an error in the data is named (one in ten may be wrong
+there), nothing is called wrong, and a credible set is complete. [-]
+"""
 MIN_DISCRIMINATION = 9.0
-"""With less than this squared distance to a rival no cause is named, whatever the record happens to say."""
+"""No cause is named with less than this squared distance to a rival, however the noise of this record happens to
+fall.
+"""
 REFUTED_NATS = 16.0
-"""A rival whose fit is this far behind the best is refuted: where D is 9, luck would have to be worth 3 σ."""
+"""A rival with a log posterior this far below the best is refuted: where D is 9, the noise would have to be off by 3
+σ.
+"""
 
 
 def sizes_in_tolerances(entries: Sequence[Entry], ids: Ids, z: np.ndarray, kappa: float) -> dict[str, float]:
@@ -59,7 +65,7 @@ def sizes_in_tolerances(entries: Sequence[Entry], ids: Ids, z: np.ndarray, kappa
 
 
 def practical_causes(entries: Sequence[Entry], ids: Ids, z: np.ndarray, kappa: float) -> Ids:
-    """Return those causes that are of a practical size: beyond what calibration may do."""
+    """Return the causes that are of a practical size: beyond calibration."""
     found = sizes_in_tolerances(entries, ids, z, kappa)
     return tuple(cause_id for cause_id in ids if found[cause_id] > PRACTICAL_TOLERANCES)
 
@@ -99,11 +105,11 @@ def decide(
     """Return the verdict.
 
     Args:
-        probabilities: hypothesis → probability; with those outside the catalogue they sum to 1.
+        probabilities: hypothesis → probability; with those of explanations out of the catalogue they sum to 1.
         outside: probability of a force or a drift that no cause explains.
         practical: the most probable hypothesis' causes are all of a practical size.
         apart: D of the most probable hypothesis against its closest rival.
-        late: what begins in mid-trial.
+        late: the most probable change point.
     """
     late = late or ChangePointSummary()
     best = max(probabilities, key=lambda ids: probabilities[ids])
@@ -121,12 +127,12 @@ def decide(
 
 
 EXCESS_SIGMAS = 6.0
-"""A square of the whitened residual that is so many standard deviations above that of noise is no noise. [-]"""
+"""A whitened residual whose sum of squares is so many standard deviations above that of noise is no noise. [-]"""
 
 
 def has_moved(entries: Sequence[Entry], z: np.ndarray, kappa: float) -> bool:
-    """Say whether a fit z (k,) is no longer the vehicle that was declared: a number that all records share is more than
-    PRACTICAL_TOLERANCES off, or the widest scale κ of the tolerances is the most probable.
+    """Say whether a fit z (k,) is no longer the vehicle that was declared: a number that all records share is more
+    than PRACTICAL_TOLERANCES off, or the widest scale κ of the tolerances is the most probable.
     """
     shared = [k for k, entry in enumerate(entries) if entry.record < 0]
     sizes = [abs(float(z[k])) / entries[k].parameter.tolerance for k in shared]
@@ -136,12 +142,13 @@ def has_moved(entries: Sequence[Entry], z: np.ndarray, kappa: float) -> bool:
 FARTHEST_TOLERANCES = PRACTICAL_TOLERANCES * max(KAPPAS)
 """A number that is not named and is off by more than this is no calibration, at any scale of the tolerances. [τ]"""
 AT_BOUND = 0.99
-"""A sensor's number at this share of its bound is where its fit was stopped. [-]"""
+"""A sensor's number at this share of its bound was stopped there by the fit. [-]"""
 
 
 def is_near(entries: Sequence[Entry], z: np.ndarray, named: Ids) -> bool:
-    """Say whether an explanation z (k,) is near the records: it moves no number of the vehicle and its sensors that it
-    does not name farther than any calibration may, and none of a sensor that it names beyond what a sensor can be.
+    """Say whether an explanation z (k,) is near the records: it moves no number of the vehicle and its sensors that
+    it does not name farther than any calibration may, and none of a sensor that it names to the bound of a possible
+    sensor.
     """
     for entry, value in zip(entries, z.tolist(), strict=False):
         parameter = entry.parameter
@@ -163,8 +170,8 @@ def is_noise(r: np.ndarray) -> bool:
 
 
 def qualified(verdict: str, entries: Sequence[Entry], best: Candidate) -> str:
-    """Return a verdict that names nothing as the best fit allows it: a vehicle that had to move far is not one with
-    nothing wrong, and where the best fit leaves more than noise nothing came near.
+    """Return a verdict that names nothing, qualified by the best fit: if the vehicle's numbers had to move far, the
+    verdict is not "nothing wrong", and where the best fit leaves more than noise, no explanation is near the records.
     """
     if verdict in (NOTHING_WRONG, UNDECIDED) and not is_noise(best.fit.r):
         return NOTHING_NEAR
@@ -174,14 +181,14 @@ def qualified(verdict: str, entries: Sequence[Entry], best: Candidate) -> str:
 
 
 UNTRIED_LOG_POSTERIOR = 2.0
-"""A hypothesis without a fit of its own is at least this far behind the best in log posterior."""
+"""The log posterior of a hypothesis without a fit of its own is at least this far below the best."""
 FURTHER_CAUSE_ODDS = NAMED_PROBABILITY / (1.0 - NAMED_PROBABILITY)
 """A further cause has to be this many times as probable as none: then it could be named."""
 
 
 class Added(NamedTuple):
-    """What a further cause adds to the log posterior of a hypothesis: under another noise both are others, and their
-    difference is about the same.
+    """Gain in log posterior of a further cause, over the hypothesis without it: with another noise both log
+    posteriors change, but their difference hardly does.
     """
 
     beside: Ids
@@ -190,13 +197,13 @@ class Added(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Beliefs:
-    """What is known of all hypotheses.
+    """The posterior over all hypotheses, as far as it is known.
 
     Attributes:
-        candidates: hypothesis → its real fit.
-        screen: what the linear problem at the wide fit says.
-        one_more: hypothesis → what its further cause adds, estimated at the fit of one with a cause less.
-        behind: hypothesis → how far its fit was behind the best when it was given up, in log posterior.
+        candidates: hypothesis → its fit by simulations.
+        screen: linear evidence at the wide fit.
+        one_more: hypothesis → gain of its further cause, estimated at the fit of one with a cause less.
+        behind: hypothesis → log posterior of its fit relative to the best when it was given up.
     """
 
     candidates: Mapping[Ids, Candidate]
@@ -221,15 +228,15 @@ class Beliefs:
         return log_sum(list(self.log_posteriors().values()))
 
     def probabilities(self, problem: Problem) -> dict[Ids, float]:
-        """Return the probability of every hypothesis as it is told, the most probable first."""
+        """Return the probability of every hypothesis as it is reported, the most probable first."""
         log, total = self.log_posteriors(), self.log_total()
         found = {ids: float(np.exp(value - total)) for ids, value in log.items()}
         return occam_folded(self._without_small(problem, found))
 
     def _estimated(self, ids: Ids, fitted: Mapping[Ids, float]) -> float:
-        """Return the log posterior of a hypothesis without a fit: of the best fit of a part of it, and what the linear
-        problem there, or else the screen, says that the rest adds; less what the screen has of causes whose own fits
-        did not keep it.
+        """Return the log posterior of a hypothesis without a fit: that of the best fit of a part of it, plus the
+        predicted gain of the rest by the linear problem there, or else by the screening; less the excess of that
+        prediction for causes whose own fits gained less.
         """
         seen = self.one_more.get(ids)
         if seen and seen.beside in fitted:
@@ -241,19 +248,19 @@ class Beliefs:
             if combination in fitted
         ]
         part = max(parts, key=lambda each: fitted[each], default=())
-        promised_too_much = sum(
-            self._promised_too_much((cause_id,), fitted) for cause_id in ids if cause_id not in part
+        excess = sum(
+            self._excess_of_prediction((cause_id,), fitted) for cause_id in ids if cause_id not in part
         )
-        return fitted[part] + self.screen.adds(ids, part) - promised_too_much
+        return fitted[part] + self.screen.adds(ids, part) - excess
 
-    def _promised_too_much(self, ids: Ids, fitted: Mapping[Ids, float]) -> float:
-        """Return how much less than the linear problem says the fit of causes by themselves has over nothing."""
+    def _excess_of_prediction(self, ids: Ids, fitted: Mapping[Ids, float]) -> float:
+        """Return by how much the predicted gain of single causes over no cause exceeds the gain of their fits."""
         if ids not in fitted or () not in fitted:
             return 0.0
         return max(self.screen.adds(ids, ()) - (fitted[ids] - fitted[()]), 0.0)
 
     def _without_small(self, problem: Problem, probabilities: Mapping[Ids, float]) -> dict[Ids, float]:
-        """Return probabilities where causes of less than a practical size are not told beside others of more."""
+        """Return probabilities where causes below a practical size are not reported together with causes above it."""
         found = dict(probabilities)
         for ids, candidate in self.candidates.items():
             kept = practical_causes(problem.entries, ids, candidate.fit.z, candidate.kappa)
@@ -263,8 +270,9 @@ class Beliefs:
 
 
 def occam_folded(probabilities: Mapping[Ids, float]) -> dict[Ids, float]:
-    """Return probabilities, the most probable first, where a further cause that is not needed is not told: those of
-    hypotheses that are not FURTHER_CAUSE_ODDS times as probable as a part of them are that part's.
+    """Return probabilities, the most probable first, where a further cause that is not needed is not reported: the
+    probability of a hypothesis that is not FURTHER_CAUSE_ODDS times as probable as a part of it is added to that
+    part.
     """
     found = dict(probabilities)
     for ids in sorted(probabilities, key=len, reverse=True):

@@ -1,16 +1,19 @@
-"""The pool of fitted hypotheses: each keeps its best fit, and all follow when noise or discretisation are known better.
+"""The pool of fitted hypotheses: each keeps its best fit, and all are updated when the noise or the discretisation
+error is known better.
 
-Simulations have non-smooth points, and a fit may end in a local minimum. So what is close to the best is fitted again
-with a Jacobian of its own, and rivals from where the others are. `Fits.sharpen` estimates the noise again behind the
-best fit, and takes from the records what economical steps get wrong there, where that is seen.
+Simulations have non-smooth points, and a fit may end in a local minimum. So hypotheses close to the best are fitted
+again with a Jacobian of their own, and rivals from each other's optimum. `Fits.sharpen` estimates the noise again
+from the residual of the best fit, and corrects for the discretisation error of economical steps there, where that is
+visible.
 
-One noise for all favours what it was found behind: what is slow in a record is noise to one explanation, and motion to
-another. So each has, in the end, the noise θ that is the most probable beside it (`refit_noise`), in the linear
-problem around its fit, all channels at once:
+A noise shared by all hypotheses favours the one from whose residual it was estimated: a slow part of a record is
+noise to one explanation, and motion to another. So each has, in the end, the noise θ that is the most probable given
+that explanation (`refit_noise`), in the linear problem around its fit, all channels at once:
 
     max_θ  −½ (rᵀ Σ⁻¹ r − bᵀ P⁻¹ b) − ½ log det (D P) − ½ log det Σ + log p(θ),    A = Jᵀ Σ⁻¹ J,  b = Jᵀ Σ⁻¹ r
 
-a channel after the other: what the others say of the parameters, N(m, M), is the prior of those behind this one.
+one channel after the other: the posterior of the parameters given the other channels, N(m, M), is their prior for
+this one.
 """
 
 from __future__ import annotations
@@ -48,18 +51,18 @@ Made = TypeVar("Made")
 
 @dataclass(kw_only=True, eq=False)
 class Fits:
-    """The fits of hypotheses, which get better and more, and whose problem gets sharper where the best of them is.
+    """The fits of hypotheses, which are improved and extended, in a problem that is refined at the best of them.
 
     Attributes:
         problem: records and parameters.
-        progress: told what is being tried.
+        progress: called with the hypothesis that is being fitted.
         wide: the fit with wide tolerances.
-        screen: what the linear problem at the wide fit says.
-        candidates: hypothesis → its real fit.
+        screen: linear evidence at the wide fit.
+        candidates: hypothesis → its fit by simulations.
         refined: hypotheses that were fitted with sensitivities of their own.
-        side: threads for fits side by side, whose runs may use those of the problem.
-        behind: hypothesis → how far its fit was behind the best when it was given up, in log posterior.
-        economical: the problem before what economical steps get wrong was taken from its records.
+        side: threads for fits in parallel, whose simulations may use those of the problem.
+        behind: hypothesis → log posterior of its fit relative to the best when it was given up.
+        economical: the problem before its records were corrected for the error of economical steps.
         sharp_at: the hypothesis at whose fit that was done.
         nominal: residual (m,) and sensitivities (m, k) of the nominal model.
     """
@@ -89,8 +92,8 @@ class Fits:
         self.fit_all([ids], start)
 
     def fit_all(self, several: Sequence[Ids], start: Fit | None = None, words: str = "") -> None:
-        """Fit hypotheses with real runs, side by side: with the sensitivities of the wide fit, those that no fit is
-        known of; or from another fit, and keep what is better.
+        """Fit hypotheses by simulations, in parallel, and keep better fits: with the sensitivities of the wide fit
+        those that have no fit yet; or all of them, starting from another fit.
         """
         wanted = [ids for ids in dict.fromkeys(several) if start or ids not in self.candidates]
         for ids, found in zip(
@@ -101,14 +104,14 @@ class Fits:
             self._take(found)
 
     def _take(self, found: Candidate) -> None:
-        """Keep a candidate if it is better than what is known of it."""
+        """Keep a candidate if it is better than the known fit of its hypothesis."""
         known = self.candidates.get(found.ids)
         if known is None or found.log_posterior > known.log_posterior:
             self.candidates[found.ids] = found
             self.refined.discard(found.ids)
 
     def _fitted(self, ids: Ids, start: Fit | None) -> Candidate:
-        """Return a hypothesis with its fit from another, or from the wide one."""
+        """Return a hypothesis with its fit, started from another fit or from the wide one."""
         D, z = variances(self.problem.entries, ids, 1.0), None if start else self.screen.starts.get(ids)
         start = start or self.wide
         z = posterior(start.quadratic, D).z if z is None else z
@@ -141,8 +144,9 @@ class Fits:
             self._again(now)
 
     def cross(self) -> None:
-        """Fit the close rivals of the best candidate from where that is, and it from where they are, and keep what is
-        better: where a drum stops or a cable falls slack runs have kinks, and a fit may end in a local minimum.
+        """Fit the close rivals of the best candidate from its optimum, and the best from theirs, and keep better
+        fits: where a drum stops or a cable falls slack, simulations have non-smooth points, and a fit may end in a
+        local minimum.
         """
         for _ in range(settings.MAX_ADDED):
             best = self.best()
@@ -159,7 +163,7 @@ class Fits:
                 return
 
     def _again(self, candidate: Candidate) -> None:
-        """Fit a candidate with sensitivities of its own, under its most probable κ; again if that turns out another."""
+        """Fit a candidate with sensitivities of its own, under its most probable κ; again if that κ has changed."""
         self.refined.add(candidate.ids)
         (J, made_at), D = (
             self._slopes_at(candidate.fit),
@@ -175,8 +179,8 @@ class Fits:
             )
 
     def _slopes_at(self, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-        """Return sensitivities (m, k) that hold at a fit, and where they were made (k,): those of the candidate that
-        has any made closest by; new ones if there is none, or the fit has them already.
+        """Return sensitivities (m, k) that hold at a fit, and their linearisation point (k,): those of the candidate
+        with the closest one; new ones if none is close, or if the fit's own are.
         """
         near = settings.JACOBIAN_HOLDS_TOLERANCES
         if fit.moved(self.problem) > near:
@@ -196,7 +200,9 @@ class Fits:
         return self.candidates[ids]
 
     def _below(self, ids: Ids, fit: Fit) -> None:
-        """Fit a part of a hypothesis from its fit, if that is better than what is known of the part."""
+        """Fit a part of a hypothesis, started from the fit of the whole; keep it if it is better than the known fit
+        of the part.
+        """
         known = self.candidates.get(ids)
         D = variances(self.problem.entries, ids, known.kappa if known else 1.0)
         z = posterior(fit.quadratic, D).z
@@ -206,12 +212,16 @@ class Fits:
             self.refined.discard(ids)
 
     def _settled(self, fit: Fit, near: float) -> bool:
-        """Say whether a fit has converged close to where its sensitivities were made, or has not left from there."""
+        """Say whether a fit has converged close to the linearisation point of its sensitivities, or has not moved
+        from it.
+        """
         moved = fit.moved(self.problem)
         return moved == 0.0 or (fit.converged and moved < near)
 
     def _with_slopes(self, J: np.ndarray, ids: Ids) -> np.ndarray:
-        """Return sensitivities with secants for those causes of a hypothesis that do nothing when they are small."""
+        """Return sensitivities with secants for the causes of a hypothesis that have no effect when they are
+        small.
+        """
         J = J.copy()
         for k in columns_of(self.problem.entries, ids):
             if k in self.screen.columns and is_flat(self.problem.entries[k], J[:, k]):
@@ -219,15 +229,15 @@ class Fits:
         return J
 
     def _in_parallel(self, make: Callable[[Asked], Made], several: Sequence[Asked]) -> Iterator[Made]:
-        """Return what is made of each of several, side by side: the runs of one fit come one after the other."""
+        """Return `make` of each of several, in parallel: the simulations of one fit are sequential."""
         return self.side.map(make, several)
 
     def _report_progress(self, share: float, words: str, ids: Ids, more: str = "") -> None:
         self.progress(share, f"{words} {' + '.join(ids) or 'nothing wrong'}{more}")
 
     def sharpen(self) -> None:
-        """Estimate the noise behind the best fit, take from the records what economical steps get wrong there, and fit
-        all again; nothing where neither is seen.
+        """Estimate the noise from the residual of the best fit, correct for the error of economical steps there, and
+        fit all again; do nothing where neither changes visibly.
         """
         best = self.best()
         if self.sharp_at == best.ids:
@@ -241,8 +251,8 @@ class Fits:
             self._go_on()
 
     def _estimate_noise(self, best: Candidate) -> bool:
-        """Estimate the noise behind the best fit, and make white by it what the noise before has made white; say
-        whether it is another.
+        """Estimate the noise from the residual of the best fit, and whiten all fits with it instead of the old noise;
+        say whether it has changed.
         """
         D, fit = variances(self.problem.entries, best.ids, best.kappa), best.fit
         near = fit.moved(self.problem) < settings.JACOBIAN_HOLDS_TOLERANCES
@@ -263,15 +273,15 @@ class Fits:
         return True
 
     def _nearer(self, wide: Fit) -> Fit:
-        """Return a wide fit, or the best one where that comes closer to the records under the noise behind it: far from
-        them the linear problem says nothing of other causes.
+        """Return a wide fit, or the best one where the wide fit is poor and the best has a smaller whitened residual:
+        far from the records the linear problem is uninformative about other causes.
         """
         best = self.best().fit
         return best if is_poor_fit(wide) and best.r @ best.r < wide.r @ wide.r else wide
 
     def _give_up(self, best: Candidate) -> None:
-        """Give up what is hopelessly behind the best candidate, also after the step that its linear problem promises
-        under the noise as it is known by now; but no part of the best.
+        """Give up candidates with a log posterior HOPELESS_NATS below the best, including the gain that their linear
+        problem predicts with the noise as it is now estimated; but no part of the best.
         """
         behind = {
             ids: candidate.optimistic_log_posterior - best.optimistic_log_posterior
@@ -282,7 +292,7 @@ class Fits:
         self.candidates = {ids: candidate for ids, candidate in self.candidates.items() if ids in kept}
 
     def _go_on(self) -> None:
-        """Fit all candidates from where they are, with the sensitivities at hand."""
+        """Continue the fits of all candidates, with the sensitivities at hand."""
         ids_of = list(self.candidates)
         for ids, fit in zip(ids_of, self._in_parallel(self._going_on, ids_of), strict=True):
             self._keep(ids, fit)
@@ -290,18 +300,20 @@ class Fits:
         self.refined &= set(self.candidates)
 
     def _going_on(self, ids: Ids) -> Fit:
-        """Return the fit of a candidate from where it is, with the sensitivities at hand."""
+        """Return the fit of a candidate continued, with the sensitivities at hand."""
         fit = self.candidates[ids].fit
         return refit(self.problem, fit.z, fit.J, fit.D, most_fresh=0, made_at=fit.made_at)
 
 
 def log_density_of_noise(record: Observed, name: str) -> float:
-    """Return what the noise of a channel adds to the log density of its samples: −½ log det Σ + log p(θ)."""
+    """Return the part of the log density of a channel's samples that depends on its noise alone: −½ log det Σ + log
+    p(θ).
+    """
     return log_prior_of(record.noise[name], sensor_of(record, name)) - record.noise[name].log_scale
 
 
 def gained_by_noise(before: Problem, after: Problem) -> float:
-    """Return what another noise adds to the log density of all samples, but for their residual."""
+    """Return the change of the log density of all samples with another noise, without that of the residual."""
     return sum(
         log_density_of_noise(new, name) - log_density_of_noise(old, name)
         for old, new in zip(before.records, after.records, strict=True)
@@ -310,8 +322,8 @@ def gained_by_noise(before: Problem, after: Problem) -> float:
 
 
 class WithRefittedNoise(NamedTuple):
-    """A hypothesis with the noise behind it: the problem with that, the hypothesis as it is fitted then, and as it was
-    fitted before, with the evidence that it has now.
+    """A hypothesis with its own noise: the problem with that noise, the hypothesis refitted in it, and the same with
+    its fit from before and the new evidence.
     """
 
     problem: Problem
@@ -320,7 +332,7 @@ class WithRefittedNoise(NamedTuple):
 
 
 def with_refitted_noise(problem: Problem, candidate: Candidate) -> WithRefittedNoise:
-    """Return a hypothesis with the noise that is the most probable one behind it, which may ask for another κ."""
+    """Return a hypothesis with its most probable noise, with which another κ may be the most probable."""
     fit, found = candidate.fit, list[WithRefittedNoise]()
     for kappa in sorted({candidate.kappa, min(KAPPAS)}):
         D = variances(problem.entries, candidate.ids, kappa)
@@ -335,8 +347,8 @@ def with_refitted_noise(problem: Problem, candidate: Candidate) -> WithRefittedN
 
 
 def gain_of_refitted_noise(problem: Problem, linear: Linear, D: np.ndarray) -> float:
-    """Return what the log evidence of the linear problem around an explanation gains with the noise that is the most
-    probable beside it; D are the prior variances of its parameters (k,).
+    """Return the gain in log evidence of the linear problem around an explanation with its most probable noise; D are
+    the prior variances of its parameters (k,).
     """
     more = refit_noise(problem, linear, D)
     again = Linear(*(whitened_again(problem, more, candidate) for candidate in linear))
@@ -345,10 +357,10 @@ def gain_of_refitted_noise(problem: Problem, linear: Linear, D: np.ndarray) -> f
 
 
 def refit_noise(problem: Problem, linear: Linear, D: np.ndarray) -> Problem:
-    """Return the problem with the noise that is the most probable one beside an explanation.
+    """Return the problem with the most probable noise given an explanation.
 
     Args:
-        problem: with the noise that the linear problem was made white by.
+        problem: with the noise that whitens the linear problem.
         linear: around the fit of the explanation.
         D: prior variances of its parameters (k,).
     """
@@ -366,11 +378,11 @@ def refit_noise(problem: Problem, linear: Linear, D: np.ndarray) -> Problem:
 def log_evidence_of(
     problem: Problem, linear: Linear, D: np.ndarray, kept: Sequence[Mapping[str, np.ndarray]]
 ) -> float:
-    """Return the log evidence of an explanation if only some samples were measured, with the noise that is the most
-    probable then.
+    """Return the log evidence of an explanation if only some samples were measured, with the most probable noise
+    then.
 
     Args:
-        problem: with the noise that the linear problem was made white by.
+        problem: with the noise that whitens the linear problem.
         linear: around the fit of the explanation.
         D: prior variances of its parameters (k,).
         kept: channel → which of its samples are kept (n,), of every record.
@@ -384,12 +396,12 @@ def log_evidence_of(
 
 @dataclass(frozen=True, eq=False)
 class _Channel:
-    """What a linear problem leaves of a channel of a record.
+    """The linear problem of one channel of a record.
 
     Attributes:
-        usual: what its sensor is like.
+        usual: the prior of its sensor.
         noise: of its samples.
-        whole: what is left if no parameter did anything, in the channel's unit (m,).
+        whole: residual with all parameters at 0, in the channel's unit (m,).
         J: sensitivities (m, k).
     """
 
@@ -400,7 +412,7 @@ class _Channel:
 
     @cached_property
     def q(self) -> Quadratic:
-        """The linear problem of the channel alone, made white by its noise."""
+        """The linear problem of the channel alone, whitened with its noise."""
         return Linear(self.noise.whiten(self.whole), self.noise.whiten(self.J)).quadratic
 
     def only(self, kept: np.ndarray) -> _Channel:
@@ -411,7 +423,9 @@ class _Channel:
         return replace(self, noise=noise, whole=self.whole[kept], J=self.J[kept])
 
     def with_noise_given(self, others: Quadratic, D: np.ndarray) -> _Channel:
-        """Return the channel with its most probable noise, given what others say of parameters of variances D (k,)."""
+        """Return the channel with its most probable noise, given the information of other channels on parameters of
+        prior variances D (k,).
+        """
         half = np.linalg.cholesky(np.diag(1.0 / D) + others.A)
         apart = np.linalg.solve(half, np.column_stack([self.J.T, others.b]))
         slopes, mean = apart[:, :-1].T, np.linalg.solve(half.T, apart[:, -1])
@@ -421,7 +435,7 @@ class _Channel:
 
 
 def _with_residual_noise(channels: list[_Channel], D: np.ndarray) -> list[_Channel]:
-    """Return channels with their most probable noise, beside parameters of prior variances D (k,)."""
+    """Return channels with their most probable noise, parameters of prior variances D (k,) marginalised."""
     now = _log_evidence(channels, D)
     for _ in range(settings.MAX_TRIED):
         for i, channel in enumerate(channels):
@@ -434,7 +448,7 @@ def _with_residual_noise(channels: list[_Channel], D: np.ndarray) -> list[_Chann
 
 
 def _channels(problem: Problem, linear: Linear) -> list[_Channel]:
-    """Return what a linear problem leaves of every channel of every record."""
+    """Return the linear problem of every channel of every record."""
     found, at = list[_Channel](), 0
     for record in problem.records:
         for name, noise in record.noise.items():
@@ -456,6 +470,6 @@ def _sum(channels: Sequence[_Channel], k: int) -> Quadratic:
 
 
 def _log_evidence(channels: Sequence[_Channel], D: np.ndarray) -> float:
-    """Return the log evidence of all channels under prior variances D (k,), and of their noise."""
+    """Return the log evidence of all channels under prior variances D (k,), with the log prior of their noise."""
     fixed = sum(log_prior_of(channel.noise, channel.usual) - channel.noise.log_scale for channel in channels)
     return posterior(_sum(channels, D.size), D).log_evidence + fixed

@@ -1,8 +1,9 @@
-"""The search over hypotheses: from linear evidence of all to MAP fits of a few, adding, dropping and swapping causes.
+"""The search over hypotheses: from linear evidence of all to MAP fits of a few, by adding, dropping and swapping
+causes.
 
-fit with κ = 4 → screening of nothing, all causes, all pairs → fits of the best, and of causes that come before them
-where sizes are run from the nominal model → best-first refinement → add, drop, swap, or merge two causes of the best,
-until it stays → settle the best and its rivals
+fit with κ = 4 → screening of no cause, all causes, all pairs → fits of the best, and of causes that are better where
+sizes are simulated from the nominal model → best-first refinement → add, drop, swap, or merge two causes of the best,
+until it no longer changes → refit the best and its rivals until they converge
 """
 
 from __future__ import annotations
@@ -42,12 +43,12 @@ from subzero.diagnosis.inference.screening import (
 
 @dataclass(kw_only=True, eq=False)
 class Search(Fits):
-    """A search that goes on, with more fits around the best: what was found so far is always in `candidates`.
+    """A search that can be continued, with more fits around the best: all fits so far are in `candidates`.
 
     Attributes:
-        is_far: nothing came close to the records so far, not even within wide tolerances.
-        one_more: hypothesis → what its further cause adds, estimated at the fit of one with a cause less.
-        restarted: hypotheses that were fitted from off their kinks.
+        is_far: no fit is close to the records so far, not even within wide tolerances.
+        one_more: hypothesis → gain of its further cause, estimated at the fit of one with a cause less.
+        restarted: hypotheses that were fitted again from smooth values of their non-smooth parameters.
     """
 
     is_far: bool = False
@@ -55,8 +56,8 @@ class Search(Fits):
     restarted: set[Ids] = field(default_factory=set)
 
     def grow(self) -> None:
-        """Look beside the best candidate for one more cause, in the place of each for another, and below it for one
-        less, until the best stays: once for each cause that it may have, and once more.
+        """Add a cause to the best candidate, swap each of its causes for another, and drop each, until the best no
+        longer changes: at most once for each cause that it may have, and once more.
         """
         looked: set[Ids] = set()
         for _ in range(MAX_CAUSES + 1):
@@ -77,21 +78,21 @@ class Search(Fits):
                 self._simpler()
 
     def _more(self, best: Candidate) -> list[Ids]:
-        """Return the hypotheses with one cause more that the linear problem at the best fit finds best."""
+        """Return the best hypotheses with one cause more, in the linear problem at the best fit."""
         found = self._unknown(with_one_added(self.problem, best))
         self.one_more |= {ids: Added(best.ids, log - best.log_posterior) for ids, log in found.items()}
         return _best_of(found, best.log_posterior - settings.FURTHER_CAUSE_NATS)
 
     def _without(self, best: Candidate, without: str) -> None:
-        """Fit the best hypothesis without one of its causes, and with others in its place."""
+        """Fit the best hypothesis without one of its causes, and with others instead of it."""
         rest = tuple(cause_id for cause_id in best.ids if cause_id != without)
         self._below(rest, best.fit)
         found = self._unknown(with_one_swapped(self.problem, best, rest))
         self.fit_all(sorted(found, key=lambda ids: -found[ids])[: settings.MAX_TRIED], best.fit)
 
     def _compare_with_others(self, best: Candidate) -> None:
-        """Fit what comes out best beside the other candidates, if the linear problem there has it before the best: a
-        right pair may be far from a wrong cause that is as good as any by itself.
+        """Fit the best hypotheses with one cause added to the other candidates, if their linear evidence there
+        exceeds that of the best: the true pair may be far from a wrong cause that is as probable as any by itself.
         """
         found: dict[Ids, tuple[float, Fit]] = {}
         for candidate in self.candidates.values():
@@ -103,8 +104,8 @@ class Search(Fits):
             self.fit(ids, found[ids][1])
 
     def _of_real_size(self, best: Candidate) -> None:
-        """Fit causes that do nothing while they are small beside the best, or in the place of one of its causes: no
-        linear problem knows of them.
+        """Fit causes that have no effect while they are small, added to the best or instead of one of its causes: in
+        the linear problem they have no sensitivity.
         """
         found, entries = dict[Ids, TriedSize](), self.problem.entries
         flat = set(without_slope(self.problem, best.fit.J))
@@ -121,8 +122,8 @@ class Search(Fits):
             self._take(candidate_of(self.problem, ids, fit))
 
     def _simpler(self) -> None:
-        """Fit causes in the place of two of the best candidate's: what is one and large may look like two, and then the
-        linear problem there says little of it.
+        """Fit causes instead of two of the best candidate's: one large cause may look like two, and then the linear
+        problem there is inaccurate for it.
         """
         best, found, entries = self.best(), dict[Ids, TriedSize](), self.problem.entries
         others = columns_of(
@@ -139,14 +140,18 @@ class Search(Fits):
         self.refine(2 if worth else 0)
 
     def _worth_fitting(self, found: Mapping[Ids, TriedSize], best: Candidate, least: float) -> list[Ids]:
-        """Return the best of what was tried that no fit is known of, if its log posterior adds `least` to the best."""
+        """Return the best of the hypotheses that were simulated but not yet fitted, if their log posterior exceeds
+        that of the best plus `least`.
+        """
         new = self._unknown(
             {ids: candidate.log_posterior for ids, candidate in found.items() if ids != best.ids}
         )
         return _best_of(new, best.log_posterior + least)
 
     def restart(self, candidate: Candidate) -> Candidate:
-        """Fit a candidate from off its kinks, once, and return what is best then."""
+        """Fit a candidate once more from smooth values of its non-smooth parameters, if that was not done before, and
+        return the best candidate.
+        """
         if candidate.ids not in self.restarted:
             self.restarted.add(candidate.ids)
             D = variances(self.problem.entries, candidate.ids, candidate.kappa)
@@ -160,37 +165,43 @@ class Search(Fits):
         return self.best()
 
     def _unknown(self, found: dict[Ids, float]) -> dict[Ids, float]:
-        """Return those of estimated log posteriors that no fit is known of, or only one that went astray from afar."""
+        """Return the estimated log posteriors of hypotheses without a fit, or with one in a bad local minimum, far
+        below the estimate.
+        """
         known = {ids: candidate.log_posterior for ids, candidate in self.candidates.items()}
         return {
             ids: log for ids, log in found.items() if known.get(ids, -np.inf) < log - settings.HOPELESS_NATS
         }
 
     def begin(self) -> None:
-        """Make the sensitivities at the nominal model, and the fit with wide tolerances."""
+        """Compute the sensitivities at the nominal model, and the fit with wide tolerances."""
         self.problem, self.wide, self.nominal = fit_wide(self.problem, self.progress)
         self.economical, self.is_far = self.problem, not is_close(self.problem, self.wide)
 
     def only_nothing(self) -> None:
-        """Take the wide fit for that of "nothing is wrong", before anything else is known."""
+        """Use the wide fit as that of "nothing is wrong", before any other fit."""
         self._take(candidate_of(self.problem, (), self.wide))
 
     def relinearise_at(self, fit: Fit) -> None:
-        """Make everything around a linear problem that is closer to the records than that of the wide fit."""
+        """Use a fit that is closer to the records than the wide fit as the linearisation point."""
         self.wide, self.is_far = fit, False
 
     def fit_like(self, other: Candidate) -> None:
-        """Fit a hypothesis from where it explains the same runs, recorded otherwise, with the sensitivities there."""
+        """Fit a hypothesis from its optimum for the same trials with other corrections of the records, with the
+        sensitivities there.
+        """
         z, D = other.fit.z, variances(self.problem.entries, other.ids, other.kappa)
         fit = refit(self.problem, z, self.problem.jacobian(z), D, most_fresh=1, made_at=z)
         self._take(candidate_of(self.problem, other.ids, fit))
 
     def screen_causes(self) -> None:
-        """Fill the screen: linear evidence of nothing, every cause, and every pair."""
+        """Screen: linear evidence of no cause, every cause, and every pair."""
         self.screen = screening_of(self.problem, self.wide, self.nominal, far=self.is_far)
 
     def first_fits(self) -> None:
-        """Fit nothing, and the best causes and pairs of the screen, with real runs and the sensitivities at hand."""
+        """Fit "nothing is wrong" and the best causes and pairs of the screening by simulations, with the
+        sensitivities at hand.
+        """
         if self.screen.far:
             self.fit_large_effects()
         first = [] if self.screen.far else self._first()
@@ -204,10 +215,10 @@ class Search(Fits):
         self.fit_all(list(chain([()], *best)), words="fitting")
 
     def fit_from_nominal(self) -> None:
-        """Fit causes by themselves that real runs of some sizes, from the nominal model, have before all that is known:
-        of what bends runs the linear problem at a wide fit says little. Where only wide tolerances explain the records,
-        so are the best of them in any case. Nothing to be done where they were so fitted from afar, or where nothing
-        seems wrong.
+        """Fit single causes that are better than all fits so far when some sizes of them are simulated from the
+        nominal model: for causes that change the motion much the linear problem at a wide fit is inaccurate. Where
+        only wide tolerances explain the records, the best of them are fitted in any case. Nothing is done where the
+        wide fit was far from the records, as they were so fitted then, or where nothing seems wrong.
         """
         if self.screen.far or not (self.best().ids or self.is_poor()):
             return
@@ -218,8 +229,8 @@ class Search(Fits):
             self._take(candidate_of(self.problem, ids, self._alone(ids, swept.starts[ids])))
 
     def fit_large_effects(self) -> None:
-        """Fit the best causes of the screen by themselves, the best first; if one explains the records, within declared
-        tolerances, none that real runs of some sizes have far behind it.
+        """Fit the best causes of the screen by themselves, the best first; once one explains the records, within
+        declared tolerances, those far below it in the screening are left out.
         """
         for ids in self._first():
             best = self.best().log_posterior
@@ -230,29 +241,29 @@ class Search(Fits):
                 self._keep(ids, self._alone(ids))
 
     def set_aside(self) -> dict[Ids, Candidate]:
-        """Go on as if nothing was fitted but the wide fit, and return the candidates, for `take_back`."""
+        """Continue as if only the wide fit existed, and return the candidates, for `take_back`."""
         aside, self.candidates = self.candidates, {}
         self.only_nothing()
         return aside
 
     def take_back(self, candidates: Mapping[Ids, Candidate]) -> None:
-        """Keep candidates that are better than what is known of them."""
+        """Keep candidates that are better than the known fits of their hypotheses."""
         for candidate in candidates.values():
             self._take(candidate)
 
     def refine_first(self) -> None:
-        """Fit what came out best again, with sensitivities of its own."""
+        """Fit the best candidates again, with sensitivities of their own."""
         self.refine(2)
         self.sharpen()
         self.refine()
 
     def is_poor(self) -> bool:
-        """Say whether nothing that was fitted so far explains the records, within declared tolerances."""
+        """Say whether no fit so far explains the records within declared tolerances."""
         return is_poor_fit(self.best().fit) or self.best().kappa > min(KAPPAS)
 
     def settle(self) -> None:
-        """Fit the best candidate again until it has settled, so that its numbers can be told, and what might still
-        catch up with it; then its rivals from where it is.
+        """Fit the best candidate again until it has converged, so that its numbers can be reported, and those that
+        might still become better; then its rivals from its optimum.
         """
         self._restart_best()
         stuck: set[Ids] = set()
@@ -274,7 +285,9 @@ class Search(Fits):
         self._nothing()
 
     def _restart_best(self) -> None:
-        """Fit the first candidates from off their kinks, if they are close to the best and were not so begun before."""
+        """Fit the first candidates from smooth values of their non-smooth parameters, if they are close to the best
+        and were not so restarted before.
+        """
         for ids in self._ranked()[: settings.MAX_TRIED]:
             close = self.candidates[ids].log_posterior > self.best().log_posterior - settings.HOPELESS_NATS
             if close and ids not in self.restarted:
@@ -282,7 +295,7 @@ class Search(Fits):
                 self.restart(self.candidates[ids])
 
     def _is_open(self, candidate: Candidate, best: Candidate) -> bool:
-        """Say whether a candidate that is as good as the best, or might still catch up with it, has not settled."""
+        """Say whether a candidate that is as good as the best, or might still become so, has not converged."""
         behind = best.log_posterior - candidate.optimistic_log_posterior
         if behind < settings.CLOSE_NATS:
             return not self._settled(candidate.fit, settings.OWN_JACOBIAN_TOLERANCES)
@@ -295,14 +308,15 @@ class Search(Fits):
 
     @property
     def beliefs(self) -> Beliefs:
-        """What is known of all hypotheses by now."""
+        """The posterior over all hypotheses, from the fits so far."""
         return Beliefs(
             candidates=self.candidates, screen=self.screen, one_more=self.one_more, behind=self.behind
         )
 
     def _first(self) -> list[Ids]:
-        """Return the causes that are fitted by themselves: those that the wide fit bends most, of which the linear
-        problem says little; and if it is not close to the records, the best of those that were swept.
+        """Return the causes that are fitted by themselves: those that the wide fit moves most, for which the linear
+        problem is inaccurate; or, if it is not close to the records, the best of those that were simulated at some
+        sizes.
         """
         if self.screen.far:
             return self.screen.best(1, settings.MAX_PAIRS, np.inf)
@@ -329,7 +343,9 @@ class Search(Fits):
         )
 
     def _nothing(self) -> None:
-        """Fit "nothing is wrong" from where the best fit is, if that explains more: what is outside is beside it."""
+        """Fit "nothing is wrong" from the best fit, and keep that if it is better: explanations that are not in the
+        catalogue are added to it.
+        """
         best, none = self.best(), self.candidates[()]
         for kappa in sorted({best.kappa, none.kappa}) if best.ids else ():
             D = variances(self.problem.entries, (), kappa)
@@ -339,7 +355,7 @@ class Search(Fits):
 
 
 def _akin(ids: Ids, others: Ids) -> bool:
-    """Say whether hypotheses are the same but for at most one cause more in one of them."""
+    """Say whether hypotheses differ by at most one cause, which one of them has in addition."""
     return len(set(ids) ^ set(others)) <= 1
 
 

@@ -1,8 +1,9 @@
-"""Explanations outside the list of hypotheses: latent forces, drifts and change points, on one scale of probability.
+"""Explanations that are not in the list of hypotheses: latent forces, drifts and change points, on one scale of
+probability.
 
-Each stands beside "nothing is wrong" or beside the best causes. Change points are looked for around the best
-hypothesis, and along the simulations with the best latent forces. `Findings` holds everything that an engine has found
-so far: an interrupted diagnosis concludes from it.
+Each is added to "nothing is wrong" or to the best causes. Change points are scanned around the best hypothesis, and
+along the simulations with the best latent forces. `Findings` holds the results of the engine so far: an interrupted
+diagnosis concludes from it.
 """
 
 from __future__ import annotations
@@ -62,10 +63,10 @@ if TYPE_CHECKING:
 def linearisation_points(
     search: Search, close: Sequence[RelinearisedForce], prior: float
 ) -> list[LinearisationPoint]:
-    """Return where to look.
+    """Return the linearisation points for change points: the best hypothesis, and the best forces and drifts.
 
     Args:
-        search: with its fits.
+        search: the fits of hypotheses.
         close: forces and drifts around fits of their own, most probable first.
         prior: log prior of a force, which `close` is without.
     """
@@ -80,7 +81,7 @@ def linearisation_points(
 
 
 def largest_hypotheses(search: Search) -> list[Candidate]:
-    """Return the hypotheses whose causes may be what begins in mid-trial: the best that have any."""
+    """Return the hypotheses whose causes may have a change point: the best that have any cause."""
     least = search.best().log_posterior - settings.LINEAR_NATS
     ranked = sorted(search.candidates.values(), key=lambda candidate: -candidate.log_posterior)
     return [candidate for candidate in ranked if candidate.log_posterior > least and candidate.ids][
@@ -90,14 +91,14 @@ def largest_hypotheses(search: Search) -> list[Candidate]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OutOfCatalogue:
-    """An explanation from outside the list of hypotheses.
+    """An explanation that is not in the list of hypotheses.
 
     Attributes:
-        causes: those that hold as well.
-        what: a force or a drift, or a cause that begins in mid-trial.
+        causes: those that are present as well.
+        what: a force or a drift, or a cause with a change point.
         log_posterior: on the scale of `Candidate.log_posterior`.
-        point: where it was fitted, if that explains the records.
-        own: the problem with the noise beside it, which has made a force white; None for that of the search.
+        point: linearisation point at its fit, if that explains the records.
+        own: the problem with its own noise, which whitens a force; None for that of the search.
     """
 
     causes: Ids
@@ -113,7 +114,9 @@ class OutOfCatalogue:
 
 
 def explanations_outside(search: Search) -> list[OutOfCatalogue]:
-    """Return what lies outside, most probable first: beside nothing, and beside the best causes."""
+    """Return the explanations that are not in the catalogue, most probable first: with no cause, and with the best
+    causes.
+    """
     problem, knots, best = search.problem, knots_of(search.problem), search.best()
     columns, terms = all_columns(problem, best.fit.z, knots), one_terms(problem, best.fit.z, knots)
     found = _suspected(search, columns, knots, terms)
@@ -136,15 +139,15 @@ def explanations_outside(search: Search) -> list[OutOfCatalogue]:
 
 
 def _nothing_again(search: Search, first: OutOfCatalogue) -> None:
-    """Fit "nothing is wrong" from where what explains the records is, beside nothing, if that seems more probable than
-    every hypothesis: it may only have begun in a better place.
+    """Fit "nothing is wrong" from the fit of the first explanation, if that is more probable than every hypothesis:
+    its lead may only be due to a better start.
     """
     if first.point and first.log_posterior > search.best().log_posterior:
         search.fit((), first.point.fit)
 
 
 def _finer(search: Search, found: list[OutOfCatalogue], own: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
-    """Return forces and drifts, and again with finer knots forces that are about as probable as each other."""
+    """Return forces and drifts, those forces with finer knots that are about as probable as each other."""
     problem, best = search.problem, search.best()
     alike = {
         candidate.id.removeprefix(FORCE)
@@ -162,8 +165,8 @@ def _finer(search: Search, found: list[OutOfCatalogue], own: list[OutOfCatalogue
 
 
 def is_explained(search: Search, out_of_catalogue: Sequence[OutOfCatalogue]) -> bool:
-    """Say whether a sudden cause leaves nothing but noise, and is so far before the best hypothesis that no sum of
-    causes that hold throughout can come close.
+    """Say whether a change point leaves only noise, and is so much more probable than the best hypothesis that no sum
+    of causes that hold throughout can come close.
     """
     best = max(out_of_catalogue, key=lambda candidate: candidate.log_posterior, default=None)
     if best is None or not isinstance(best.what, FittedChangePoint) or is_poor_fit(best.what.fit):
@@ -172,7 +175,9 @@ def is_explained(search: Search, out_of_catalogue: Sequence[OutOfCatalogue]) -> 
 
 
 def _sorted(found: list[OutOfCatalogue], own: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
-    """Return it all, the most probable first; of what was asked at two linearisation points, the more probable."""
+    """Return all explanations, the most probable first; of those with two linearisation points the more
+    probable one.
+    """
     kept: dict[tuple[str, Ids], OutOfCatalogue] = {}
     for each in sorted(found + own, key=lambda candidate: -candidate.log_posterior):
         kept.setdefault((each.id, each.causes), each)
@@ -182,7 +187,7 @@ def _sorted(found: list[OutOfCatalogue], own: list[OutOfCatalogue]) -> list[OutO
 def _suspected(
     search: Search, columns: dict[str, np.ndarray], knots: Knots, terms: Mapping[str, Terms]
 ) -> list[OutOfCatalogue]:
-    """Return the forces and drifts of columns, beside nothing and beside the best causes."""
+    """Return the forces and drifts of columns, with no cause and with the best causes."""
     problem, prior = search.problem, _log_prior(search.problem)
     found: list[OutOfCatalogue] = []
     for candidate in _bases(search):
@@ -203,8 +208,8 @@ def _around_themselves(
     knots: Knots,
     terms: Mapping[str, Terms],
 ) -> list[RelinearisedForce]:
-    """Return the most probable forces and drifts beside nothing as they are around fits of their own, if they have any
-    hope; none where nothing has to bend.
+    """Return the most probable forces and drifts without causes, linearised at fits of their own, if they may become
+    the best; none where "nothing is wrong" within declared tolerances is the best hypothesis.
     """
     problem, best, prior = search.problem, search.best(), _log_prior(search.problem)
     if not best.ids and best.kappa == min(KAPPAS):
@@ -221,7 +226,7 @@ def _around_themselves(
 
 
 def _promising(predicted: dict[str, float], best: Candidate) -> list[str]:
-    """Return the forces and drifts that are looked at around their own fits, of hoped-for log posteriors."""
+    """Return the forces and drifts to be linearised at their own fits, by their predicted log posteriors."""
     ranked = sorted(predicted, key=lambda name: -predicted[name])[: settings.MAX_TRIED]
     least = max(best.log_posterior - settings.FAR_NATS, predicted[ranked[0]] - settings.LINEAR_NATS)
     plain = best.kappa == min(KAPPAS) and len(best.ids) == 1
@@ -230,29 +235,31 @@ def _promising(predicted: dict[str, float], best: Candidate) -> list[str]:
 
 
 def _log_prior(problem: Problem) -> float:
-    """Return how probable a force on some axis, or the drift of some sensor, is beforehand, beside a hypothesis."""
+    """Return the log prior of a force on some axis, or of the drift of some sensor, added to a hypothesis."""
     return float(np.log(PRIOR["unknown"] / (len(AXES) + len(problem.records[0].noise))))
 
 
 def _most(found: Sequence[OutOfCatalogue]) -> float:
-    """Return the log posterior of the most probable."""
+    """Return the log posterior of the most probable explanation."""
     return max((candidate.log_posterior for candidate in found), default=-np.inf)
 
 
 def _close(found: list[OutOfCatalogue]) -> list[OutOfCatalogue]:
-    """Return what is about as probable as the best."""
+    """Return the explanations that are about as probable as the best."""
     best = _most(found)
     return [candidate for candidate in found if candidate.log_posterior > best - settings.LINEAR_NATS]
 
 
 def _bases(search: Search) -> list[Candidate]:
-    """Return the candidates that something may be added to."""
+    """Return the candidates that a force or a drift may be added to."""
     best = search.best()
     return [search.candidates[()]] + ([best] if best.ids else [])
 
 
 def _sudden(search: Search, close: Sequence[RelinearisedForce], known: float) -> list[OutOfCatalogue]:
-    """Return causes that begin in mid-trial, beside nothing else, that may be as probable as what is known."""
+    """Return causes with a change point, without other causes, that may be as probable as the best
+    explanation known.
+    """
     problem, effects = search.problem, search.problem.sudden_effects
     if not effects:
         return []
@@ -275,11 +282,12 @@ def _sudden(search: Search, close: Sequence[RelinearisedForce], known: float) ->
 
 
 def special_cases_folded(made: Sequence[FittedChangePoint]) -> list[tuple[FittedChangePoint, float]]:
-    """Return sudden causes with their log posteriors, where one that is not needed is its special case: a fin that
-    stands off after its last command may be jammed, too, and the record cannot say.
+    """Return causes with a change point and their log posteriors, where one that is not needed is merged into its
+    special case: a fin with an offset since its last command may also be jammed, and the record cannot distinguish
+    the two.
 
-    As with a further cause (`occam_folded`): what is not FURTHER_CAUSE_ODDS times as probable as its special case is
-    told as that, which has the probability of both.
+    As with a further cause (`occam_folded`): a change point that is not FURTHER_CAUSE_ODDS times as probable as its
+    special case is reported as that case, with the probability of both.
     """
     log = {(each.change_point.effect.id, each.change_point.record): each.log_posterior for each in made}
     for candidate in made:
@@ -300,13 +308,13 @@ def special_cases_folded(made: Sequence[FittedChangePoint]) -> list[tuple[Fitted
 def shares(
     search: Search, out_of_catalogue: list[OutOfCatalogue]
 ) -> tuple[dict[Ids, float], dict[Ids, float]]:
-    """Return the probabilities of hypotheses, and of everything outside with the causes that it stands beside, if they
-    are needed (`occam_folded`); together they sum to 1.
+    """Return the probabilities of hypotheses, and of explanations that are not in the catalogue with the causes that
+    they are added to, if these are needed (`occam_folded`); together they sum to 1.
     """
     inside = search.beliefs.probabilities(search.problem)
     scale = search.beliefs.log_total()
-    outside = log_sum([each.log_posterior for each in out_of_catalogue]) if out_of_catalogue else -np.inf
-    total = log_sum([scale, outside])
+    log_added = log_sum([each.log_posterior for each in out_of_catalogue]) if out_of_catalogue else -np.inf
+    total = log_sum([scale, log_added])
     found: dict[Ids, float] = {}
     for candidate in out_of_catalogue:
         ids = (*candidate.causes, candidate.id)
@@ -316,10 +324,11 @@ def shares(
 
 
 def each_with_refitted_noise(search: Search, outside: Sequence[OutOfCatalogue]) -> list[OutOfCatalogue]:
-    """Give every explanation that may be the most probable the evidence that it has with the noise behind it:
-    hypotheses in the search, and what lies outside, which is returned, most probable first.
+    """Give every explanation that may be the most probable the evidence with its own noise: hypotheses in the search,
+    and explanations that are not in the catalogue, which are returned, most probable first.
 
-    "Nothing is wrong" leaves most to noise, and gains most: nothing that is farther behind than that gains is asked.
+    "Nothing is wrong" leaves most to noise, and gains most: explanations that are less probable by more than that
+    gain are skipped.
     """
     fits, first = search.candidates, max(search.best().log_posterior, _most(outside))
     own = partial(with_refitted_noise, search.problem)
@@ -346,13 +355,13 @@ def each_with_refitted_noise(search: Search, outside: Sequence[OutOfCatalogue]) 
 
 
 def _is_force(candidate: OutOfCatalogue) -> bool:
-    """Say whether it is a force or a drift beside nothing."""
+    """Say whether it is a force or a drift without causes."""
     return isinstance(candidate.what, LatentForceCandidate) and not candidate.causes
 
 
 def _with_refitted_noise(problem: Problem, behind: Problem, candidate: OutOfCatalogue) -> OutOfCatalogue:
-    """Return what lies outside with the evidence that it has with the noise beside it; `behind` is the problem with
-    that behind "nothing is wrong".
+    """Return an explanation that is not in the catalogue with the evidence with its own noise; `behind` is the
+    problem with the noise of "nothing is wrong".
     """
     if isinstance(candidate.what, FittedChangePoint):
         return replace(
@@ -368,8 +377,8 @@ def _with_refitted_noise(problem: Problem, behind: Problem, candidate: OutOfCata
 
 
 def _gain_of_refitted_noise(problem: Problem, fitted: FittedChangePoint) -> float:
-    """Return what the log evidence of a sudden cause gains with the noise that is the most probable beside it, fitted
-    again with that: no linear problem knows that a fin cannot lose more than all of its command.
+    """Return the gain in log evidence of a change point with its most probable noise, fitted again with that: in the
+    linear problem alone nothing keeps a fin from losing more than all of its command.
     """
     own = refit_noise(problem, *fitted.linear(problem))
     more, fit = replace(fitted.problem, records=own.records), fitted.fit
@@ -382,7 +391,7 @@ def _gain_of_refitted_noise(problem: Problem, fitted: FittedChangePoint) -> floa
 def _against_nothing(
     problem: Problem, nothing: WithRefittedNoise, candidate: OutOfCatalogue
 ) -> OutOfCatalogue:
-    """Return a force or a drift likewise, around "nothing is wrong" as it is fitted with the noise behind it."""
+    """Return a force or a drift likewise, around "nothing is wrong" as it is fitted with its own noise."""
     assert isinstance(candidate.what, LatentForceCandidate)
     own, none = nothing.problem, nothing.again
     what = replace(candidate.what.whitened_anew(problem, own), fit=none.fit, kappa=none.kappa)
@@ -393,13 +402,14 @@ def _against_nothing(
 def _against_noise(
     candidate: OutOfCatalogue, what: LatentForceCandidate, log: float, behind: Problem
 ) -> OutOfCatalogue:
-    """Return a force or a drift with the noise behind nothing, or with that beside all that it might do: behind nothing
-    it is noise, and beside that noise there is little left of it; the two have an optimum each.
+    """Return a force or a drift with the noise of "nothing is wrong", or with the noise given everything that the
+    force might do: in the residual of "nothing is wrong" the force is noise, and given that noise little of the force
+    is left; so there are two optima.
 
     Args:
         candidate: as it is.
-        what: it is, white by the noise behind nothing.
-        log: what is added to its log evidence then.
+        what: its force or drift, whitened with the noise of "nothing is wrong".
+        log: added to its log evidence then.
         behind: the problem with that noise.
     """
 
@@ -428,14 +438,16 @@ def linear_of_first(search: Search, outside: Sequence[OutOfCatalogue]) -> tuple[
     return linear, variances(search.problem.entries, best.ids, best.kappa)
 
 
-def _first(search: Search, outside: Sequence[OutOfCatalogue]) -> OutOfCatalogue | None:
-    """Return what lies outside if that is the most probable explanation."""
-    first = max(outside, key=lambda candidate: candidate.log_posterior, default=None)
+def _first(search: Search, added: Sequence[OutOfCatalogue]) -> OutOfCatalogue | None:
+    """Return the explanation that is not in the catalogue, if that is the most probable one."""
+    first = max(added, key=lambda candidate: candidate.log_posterior, default=None)
     return first if first and first.log_posterior > search.best().log_posterior else None
 
 
 def _linear_of(problem: Problem, candidate: OutOfCatalogue) -> tuple[Linear, np.ndarray]:
-    """Return the linear problem around what lies outside, and the prior variances of all its parameters (k,)."""
+    """Return the linear problem around an explanation that is not in the catalogue, and the prior variances of all
+    its parameters (k,).
+    """
     if isinstance(candidate.what, FittedChangePoint):
         return candidate.what.linear(problem)
     own = candidate.own or problem
@@ -445,19 +457,19 @@ def _linear_of(problem: Problem, candidate: OutOfCatalogue) -> tuple[Linear, np.
 
 @dataclass(kw_only=True, eq=False)
 class Findings:
-    """What was found so far.
+    """Results so far.
 
     Attributes:
         search: over hypotheses.
-        detectable: what could be seen at all.
+        detectable: smallest detectable sizes of causes.
         misfit: record → channel → how the nominal model fails.
-        out_of_catalogue: what lies outside the list.
-        refuted: rivals of the best that simulations refute, however alike the linear problem has them.
-        sensitive: records whose motion no run follows for long.
-        seconds: how long each part took.
+        out_of_catalogue: explanations that are not in the list of hypotheses.
+        refuted: rivals of the best that simulations refute, however similar they are in the linear problem.
+        sensitive: records whose motion no simulation follows for long.
+        seconds: duration of each part.
         complete: nothing was left out.
-        given_up: nothing that is left to be found brings it close to what explains the records otherwise.
-        seed: of everything random.
+        given_up: no further result can make it as probable as another set of data errors.
+        seed: of all random numbers.
         budget: one of BUDGETS.
     """
 
@@ -475,11 +487,11 @@ class Findings:
 
     @property
     def problem(self) -> Problem:
-        """Records and parameters, with the noise as it is known by now."""
+        """Records and parameters, with the noise as it is estimated so far."""
         return self.search.problem
 
     @property
     def records(self) -> tuple[Observed, ...]:
-        """The records, with the noise beside the most probable explanation, as far as it has one of its own."""
+        """The records, with the noise of the most probable explanation, if it has one of its own."""
         first = _first(self.search, self.out_of_catalogue)
         return (first.own if first and first.own else self.problem).records

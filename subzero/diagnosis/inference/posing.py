@@ -1,10 +1,10 @@
-"""From records to the least-squares problem, and to a better one: noise behind a fit, finer steps.
+"""From records to the least-squares problem, and its refinements: noise from the residual of a fit, finer steps.
 
     Logged → Problem: settings in economical steps, usual noise, all effects free
-    with_noise_behind: the noise that is left behind a fit;   with_finer_steps: h(z) corrected for its discretisation
+    with_residual_noise: the noise in the residual of a fit;   with_finer_steps: h(z) corrected for its discretisation
     sensitive_runs: records of a motion that is unstable, where that is not possible
 
-What was measured stays as it was: a correction is added to the simulation. Only whole turns of a heading are taken off.
+Measured values are not changed: a correction is added to the simulation. Only whole turns of a heading are taken off.
 """
 
 from __future__ import annotations
@@ -41,16 +41,20 @@ if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.logged import Logged
 
 VISIBLE_STEP_ERROR = 1.0
-"""Squared size, in noise, of an error of the steps that is worth correcting."""
+"""Squared whitened size of an error of the steps that is worth correcting."""
 LITTLE_CLOSER, SENSITIVE_LEVELS = 0.9, 1.0
-"""A tenth closer to the nominal vehicle, runs whose steps err by a noise level more or less are sensitive. On a REMUS
-100 that is steered from outside it is seven; on a dozen records of the world 0.0 to 0.7. [-]"""
+"""The share of z at which the error of the steps is computed again, and the change of that error, in noise levels,
+from which on a run is sensitive. On a REMUS 100 that is steered from outside it is seven; on a dozen records of real
+vehicles 0.0 to 0.7. [-]
+"""
 EARLIEST_CLOCK_S = -CLOCK.parameters[0].low
-"""A clock may be so early: runs go on beyond the last sample, which happened later than it says, under the last
-command."""
+"""The earliest clock: simulations continue beyond the last sample, which was taken later than its time says, under
+the last command.
+"""
 NOISE_LEVEL_CHANGE = 0.1
-"""Change of a noise level, as a logarithm, that is worth beginning again; of its slow part,
-SLOW_NOISE_FACTOR times as much."""
+"""Change of the logarithm of a noise level that is worth a new fit; of its slow part, SLOW_NOISE_FACTOR times as
+much.
+"""
 SLOW_NOISE_FACTOR = 2.0
 
 
@@ -78,8 +82,8 @@ def pose(records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
 
 
 def posed_again(problem: Problem, records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
-    """Return the problem of records in which something was changed; what was simulated for them as they were, and still
-    holds, need not be run again.
+    """Return the problem of records that were changed; simulations of the records as they were that still hold are
+    not run again.
 
     Args:
         problem: of the records as they were, as posed.
@@ -98,12 +102,14 @@ def posed_again(problem: Problem, records: Sequence[Logged], more: Iterable[Effe
 
 
 def _serves(setting: Setting, other: Setting) -> bool:
-    """Say whether runs in a setting serve for another of the same trial: the same commands, and at least as long."""
+    """Say whether simulations of a setting hold for another of the same trial: the same commands, and at least as
+    long.
+    """
     return setting.trial.commands is other.trial.commands and setting.trial.duration >= other.trial.duration
 
 
 def _possible(effect: Effect, observed: Sequence[Observed]) -> bool:
-    """Say whether a cause can be in these trials: without a cable or a free drum, some cannot."""
+    """Say whether a cause is possible in these trials: without a cable or a free drum, some are not."""
     tethered = any(trial.setting.tethered for trial in observed)
     winch = any(trial.setting.model.winch is not None for trial in observed)
     return (effect.slot not in ("cable", "drum") or tethered) and not (effect.slot == "drum" and winch)
@@ -140,7 +146,7 @@ def _observed(trial: Logged) -> Observed:
 
 
 def _usual(time: np.ndarray, values: np.ndarray, difference: np.ndarray, usual: SensorPrior) -> Noise:
-    """Return a usual sensor's noise, without the samples that lie far off in measured − simulated (n,)."""
+    """Return a usual sensor's noise, without the outliers of measured − simulated (n,)."""
     return prior_noise(time, _used(values, difference, usual), usual)
 
 
@@ -154,13 +160,14 @@ def _used(values: np.ndarray, difference: np.ndarray, usual: SensorPrior) -> np.
 def with_residual_noise(
     problem: Problem, z: np.ndarray, D: np.ndarray, white: np.ndarray | None = None
 ) -> Problem | None:
-    """Return the problem with the noise that is left behind deviations z; None if that is as good as known.
+    """Return the problem with the noise estimated from the residual at deviations z; None if it hardly differs from
+    the present one.
 
     Args:
         problem: records and parameters.
         z: the best fit so far (k,).
         D: prior variances of the parameters in it (k,).
-        white: sensitivities of the problem close to z (m, k); if they are known, outliers are, too.
+        white: whitened sensitivities of the problem close to z (m, k); if given, the outliers are left as they are.
     """
     records = tuple(
         _without_outliers(problem, i, z) if white is None else each for i, each in enumerate(problem.records)
@@ -185,7 +192,9 @@ def with_residual_noise(
 
 
 def whitened_again(before: Problem, after: Problem, white: np.ndarray) -> np.ndarray:
-    """Return what the noise of a problem has made white (m, …), made white by that of another, of the same samples."""
+    """Return columns (m, …) that are whitened with the noise of a problem, whitened with that of another, of the same
+    samples.
+    """
     found, at = [], 0
     for old, new in zip(before.records, after.records, strict=True):
         for name, noise in old.noise.items():
@@ -195,8 +204,8 @@ def whitened_again(before: Problem, after: Problem, white: np.ndarray) -> np.nda
 
 
 def rewhitened(fit: Fit, before: Problem, after: Problem) -> Fit:
-    """Return a fit under the noise of another problem: its residual and its sensitivities made white by that, and what
-    a step is worth there.
+    """Return a fit under the noise of another problem: its residual and its sensitivities whitened with that, and the
+    predicted gain of a step there.
     """
     r, J = whitened_again(before, after, fit.r), whitened_again(before, after, fit.J)
     now, step = objective(r, fit.z, fit.D), bounded_step(J, r, fit.z, fit.D, *bounds(after))
@@ -208,7 +217,7 @@ def rewhitened(fit: Fit, before: Problem, after: Problem) -> Fit:
 
 
 def _without_outliers(problem: Problem, record: int, z: np.ndarray) -> Observed:
-    """Return a record without the samples that lie far off behind deviations z."""
+    """Return a record without the outliers of its residual at deviations z."""
     found = problem.records[record]
     shown = respond(problem.setting(record, z), found.time, found.noise)
     noise = {}
@@ -219,7 +228,7 @@ def _without_outliers(problem: Problem, record: int, z: np.ndarray) -> Observed:
 
 
 def sensor_of(record: Observed, name: str) -> SensorPrior:
-    """Return what the sensor of a channel is like, by what is known of it and by the record as it was posed."""
+    """Return the prior of a channel's sensor, from the user's knowledge of it and from the record as it was posed."""
     level, resolution = record.known.get(name, SPECS[name].noise), record.noise[name].resolution
     return SensorPrior(level, resolution, name in record.known, record.noise_times.get(name))
 
@@ -230,13 +239,13 @@ def _unit(record: Observed) -> dict[str, Noise]:
 
 
 def _behind(record: Observed, name: str, behind: ResidualNoise) -> Noise:
-    """Return the noise of a channel behind a fit."""
+    """Return the noise of a channel in the residual of a fit."""
     old = record.noise[name]
     return replace(estimate(old.time, behind, sensor_of(record, name)), used=old.used)
 
 
 def _alike(old: Noise, new: Noise) -> bool:
-    """Say whether two noises of a channel make no difference to a fit."""
+    """Say whether the difference between two noises of a channel is negligible for a fit."""
     if not np.array_equal(old.used, new.used):
         return False
     level = abs(np.log(new.sd / old.sd))
@@ -245,7 +254,7 @@ def _alike(old: Noise, new: Noise) -> bool:
 
 
 def with_finer_steps(problem: Problem, z: np.ndarray) -> Problem | None:
-    """Return the problem with the error of economical steps at z made good; None if that is not seen."""
+    """Return the problem with the error of economical steps at z corrected; None if that is negligible."""
     records, size = [], 0.0
     for i, record in enumerate(problem.records):
         wrong = _error_of_steps(problem, i, z)
@@ -255,14 +264,16 @@ def with_finer_steps(problem: Problem, z: np.ndarray) -> Problem | None:
 
 
 def _error_of_steps(problem: Problem, record: int, z: np.ndarray) -> dict[str, np.ndarray]:
-    """Return channel → what economical steps get wrong at z (n,). [display unit]"""
+    """Return channel → error of economical steps at z (n,). [display unit]"""
     found, setting = problem.records[record], problem.setting(record, z)
     coarse, fine = (respond(made, found.time, found.noise) for made in (setting, finer(setting)))
     return {name: fine[name] - coarse[name] for name in found.noise}
 
 
 class SensitiveRun(NamedTuple):
-    """A record whose motion no run follows for long, and the channel that shows most of it: by so many noise levels."""
+    """A record whose motion no simulation follows for long, and the channel that shows it most: by so many noise
+    levels.
+    """
 
     record: str
     channel: str
@@ -270,8 +281,8 @@ class SensitiveRun(NamedTuple):
 
 
 def sensitive_runs(problem: Problem, z: np.ndarray) -> tuple[SensitiveRun, ...]:
-    """Return the records whose steps are wrong by something else at a vehicle that is a little closer to the nominal
-    one than z: where a motion is unstable, errors of a run grow to what they like, and none can be made good.
+    """Return the records for which the error of the steps changes if the vehicle is a little closer to the nominal
+    one than z: where a motion is unstable, errors of a simulation grow without limit, and cannot be corrected.
     """
     found = []
     for i, record in enumerate(problem.records):

@@ -34,20 +34,24 @@ if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.effect import Effect, Parameter
 
 JACOBIAN_STEP = 0.2
-"""Step of a sensitivity, in tolerances; a whole one from a state of rest (a play, a friction), where slopes jump."""
+"""Step of a sensitivity, in tolerances; a whole tolerance from a state of rest (a play, a friction), where slopes
+jump.
+"""
 JACOBIAN_STEP_SHARE = 0.03
-"""... and at least this share of what is there: far from the nominal model runs are rougher."""
+"""... and at least this share of the deviation itself: far from the nominal model simulations are less smooth."""
 ROUGH_LEVELS = 0.5
-"""Runs in rougher steps that are this many levels of the noise off (root mean square) serve for no sensitivity. [-]"""
+"""Simulations in coarser steps with an error of this many levels of the noise (root mean square) are used for no
+sensitivity. [-]
+"""
 POST_RUN_SLOTS = ("sensors", "clock")
-"""Slots that act on a finished run."""
+"""Slots of effects that act on a finished simulation."""
 Job = tuple[int, np.ndarray, Stop | None]
-"""A run to be made: of a record, with deviations, from a stop on if there is one."""
+"""A simulation to be run: of a record, with deviations, from a stop on if there is one."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Observed:
-    """A record, ready.
+    """A record, prepared for fits.
 
     Attributes:
         name: short.
@@ -56,8 +60,8 @@ class Observed:
         noise: channel → its noise.
         setting: the nominal one, in economical steps.
         known: channel → level of noise that the user knows.
-        correction: channel → what is added to the simulation (n,): the error of its economical steps, a drift.
-        noise_times: channel → what the correlation times of the noise beside it are like, as far as that is known.
+        correction: channel → correction added to the simulation (n,): the error of its economical steps, a drift.
+        noise_times: channel → the prior of the correlation times of its noise, as far as that is known.
     """
 
     name: str
@@ -70,13 +74,15 @@ class Observed:
     noise_times: Mapping[str, CorrelationTimes] = field(default_factory=dict)
 
     def corrected(self, more: Mapping[str, np.ndarray]) -> Observed:
-        """Return the record beside a simulation to which more is added; what was measured stays as it is."""
+        """Return the record with more added to the correction of the simulation; the measured values are
+        unchanged.
+        """
         both = {name: self.correction.get(name, 0.0) + column for name, column in more.items()}
         return replace(self, correction={**self.correction, **both})
 
     def whiten(self, values: Mapping[str, np.ndarray]) -> np.ndarray:
-        """Return what makes the noise of every channel white: channel → (n,) to its used samples, one channel after the
-        other (m,).
+        """Return values whitened by the noise of every channel: channel → (n,) to its used samples, one channel after
+        the other (m,).
         """
         known = np.concatenate([values[name][noise.used] for name, noise in self.noise.items()])
         white = np.empty(known.size)
@@ -85,7 +91,7 @@ class Observed:
 
     @cached_property
     def _filters(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Where the channels end, and their filters, one behind the other."""
+        """Where the channels end, and their filters, one after the other."""
         filters = zip(*(noise.filter for noise in self.noise.values()), strict=True)
         kept, gain, scale = (np.concatenate(each) for each in filters)
         return np.cumsum([0, *(noise.count for noise in self.noise.values())]), kept, gain, scale
@@ -93,14 +99,14 @@ class Observed:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Problem:
-    """Records and all that is free.
+    """Records and free parameters.
 
     Attributes:
         records: what was measured.
-        entries: what z holds, in order.
+        entries: the parameters in z, in order.
         onsets: effects that are no part of z, as they can only begin in mid-trial.
         pool: threads for runs side by side; compiled code runs in them freely.
-        kept: how many runs were asked for, and those that were made last.
+        kept: how many simulations were requested, and the last ones made.
     """
 
     records: tuple[Observed, ...]
@@ -121,8 +127,8 @@ class Problem:
         return self._changed(early, record, z, late=True) if late else early
 
     def roughly(self, z: np.ndarray) -> Problem:
-        """Return the same in rougher steps, for sensitivities that a linear look takes; itself if runs with deviations
-        z (k,) differ more in such steps than noise lets one see.
+        """Return the same in coarser steps, for the sensitivities of a linear screening; itself if the error of such
+        steps at deviations z (k,) is visible above the noise.
         """
         whole = np.zeros(0)
         made = [
@@ -137,7 +143,7 @@ class Problem:
         return rough if float(np.mean(apart**2)) < ROUGH_LEVELS**2 else self
 
     def _changed(self, setting: Setting, record: int, z: np.ndarray, *, late: bool) -> Setting:
-        """Return a setting with those deviations that change a run, or with those of the sensors (`late`)."""
+        """Return a setting with the deviations that change a simulation, or with those of the sensors (`late`)."""
         numbers = z.tolist()
         for effect, own, where in self._groups[late]:
             values = [numbers[k] for k in own]
@@ -147,7 +153,7 @@ class Problem:
 
     @cached_property
     def _is_early(self) -> np.ndarray:
-        """Which entries change a run (k,)."""
+        """Which entries change a simulation (k,)."""
         return np.array([not self._late(k) for k in range(len(self.entries))])
 
     @property
@@ -158,7 +164,7 @@ class Problem:
 
     @cached_property
     def _groups(self) -> Mapping[bool, list[tuple[Effect, list[int], int]]]:
-        """Effects with their entries: those that change a run, and those of the sensors (True)."""
+        """Effects with their entries: those that change a simulation (False), and those of the sensors (True)."""
         every = grouped(self.entries)
         return {
             late: [each for each in every if late == (each[0].slot in POST_RUN_SLOTS)]
@@ -166,7 +172,7 @@ class Problem:
         }
 
     def residual(self, z: np.ndarray) -> np.ndarray:
-        """Return r(z) (m,); NaN if a run could not go on."""
+        """Return r(z) (m,); NaN if a simulation failed."""
         return self.residuals([z])[0]
 
     def residuals(
@@ -185,8 +191,8 @@ class Problem:
     def jacobian(
         self, z: np.ndarray, columns: Sequence[int] | None = None, *, side: float = 1.0
     ) -> np.ndarray:
-        """Return J (m, k) at z by one-sided differences, upwards (1) or downwards (-1) where bounds let them; only some
-        of its columns, if asked, others 0.
+        """Return J (m, k) at z by one-sided differences, upwards (1) or downwards (-1) where bounds let them; only
+        some of its columns, if asked, others 0.
         """
         wanted = range(len(self.entries)) if columns is None else columns
         base = self.tracks([(i, z) for i in range(len(self.records))])
@@ -220,8 +226,8 @@ class Problem:
     def central_jacobian(self, z: np.ndarray) -> np.ndarray:
         """Return J (m, k) at z by central differences, whose error is of the second order; one-sided at bounds.
 
-        Where runs part quickly, as those of an unstable vehicle, and columns nearly cancel, one-sided ones show
-        information where there is none.
+        Where simulations diverge quickly, as those of an unstable vehicle, and columns nearly cancel, one-sided
+        differences show information where there is none.
         """
         return 0.5 * (self.jacobian(z) + self.jacobian(z, side=-1.0))
 
@@ -238,8 +244,8 @@ class Problem:
     def tracks(
         self, jobs: Sequence[tuple[int, np.ndarray]], stops: Sequence[Stop | None] | None = None
     ) -> list[Track]:
-        """Return the track of each (record, z), side by side; none is run twice, and each only from its stop on, where
-        it has one.
+        """Return the track of each (record, z), side by side; none is run twice, and each only from its stop on,
+        where it has one.
         """
         self.kept.count(len(jobs))
         asked = [(i, np.where(self._is_early, z, 0.0)) for i, z in jobs]
@@ -258,7 +264,9 @@ class Problem:
         return [found[name] for name in names]
 
     def _stops(self, record: int, z: np.ndarray, columns: Iterable[int]) -> dict[float, Stop]:
-        """Return the run of a record as it was when columns begin: begin [s] → stop, none for those at the start."""
+        """Return the states of a record's simulation at the onsets of columns: onset [s] → stop, none for those at
+        the start.
+        """
         begins = {self.entries[k].parameter.begins for k in columns} - {0.0}
         return with_stops(self.setting(record, z, late=False), begins)[1] if begins else {}
 
@@ -281,7 +289,9 @@ class Problem:
         measured: bool = False,
         true: Mapping[str, np.ndarray] | None = None,
     ) -> np.ndarray:
-        """Return W h of a record, or W (y − h); quicker if it is known what is `true` along the track."""
+        """Return W h of a record, or W (y − h); quicker if the true values of the channels along the track are given
+        as `true`.
+        """
         seen, shown = self.records[record], self.shown(record, setting, track, true)
         if measured:
             shown = {
@@ -304,16 +314,18 @@ class Problem:
         }
 
     def true(self, record: int, setting: Setting, track: Track) -> dict[str, np.ndarray]:
-        """Return what is true of the channels of a record along a track: channel → (times of the track,)."""
+        """Return the true values of the channels of a record along a track: channel → (times of the track,)."""
         return {name: truth(setting, track[1], name) for name in self.records[record].noise}
 
 
 Progress = Callable[[float, str], None]
-"""Called with the fraction that is done and what is being tried."""
+"""Called with the fraction that is done and a description of the current step."""
 
 
 class SizeRun(NamedTuple):
-    """A run with entry k of another size: deviations (k,), residual (m,), and the sensitivity to that entry (m,)."""
+    """A simulation with entry k at another size: deviations (k,), residual (m,), and the sensitivity to that entry
+    (m,).
+    """
 
     k: int
     z: np.ndarray
@@ -329,9 +341,10 @@ def sizes_run(
     scales: Sequence[float],
     records: Sequence[int] | None = None,
 ) -> list[SizeRun]:
-    """Run sizes of entries about z, side by side; those that cannot be run are left out.
+    """Simulate sizes of entries about z, in parallel; those whose simulation fails are left out.
 
-    A sensitivity is the difference quotient between neighbouring sizes: what bends runs has another one at each.
+    A sensitivity is the difference quotient between neighbouring sizes: of an effect with a non-linear response it
+    differs from size to size.
 
     Args:
         problem: records and parameters.
@@ -354,8 +367,8 @@ def sizes_run(
 
 
 def _slope_at(runs: Mapping[float, np.ndarray], size: float) -> np.ndarray:
-    """Return the sensitivity (m,) at a size of runs, size → residual (m,), between those next to it; NaN if there is
-    none.
+    """Return the sensitivity (m,) at a size, from the neighbouring sizes of runs, size → residual (m,); NaN if there
+    is none.
     """
     row = sorted(run for run in runs if run == size or np.isfinite(runs[run]).all())
     i = row.index(size)

@@ -1,9 +1,10 @@
 """Screening: the linear evidence of every hypothesis at the fit with κ = 4, and of all neighbours of a fitted one.
 
-A cause that does nothing while it is small has no slope, and a one-sided slope at a non-smooth point says nothing of
-the other side: real simulations try some sizes of such causes. If even κ = 4 does not come close to the records, all
-causes are tried so, and the best fitted by themselves, before a force or an onset takes the run along the records. So
-they are from the nominal model where something seems wrong: a wide fit may have one large cause for many small ones.
+A cause that has no effect while it is small has no slope, and a one-sided slope at a non-smooth point does not hold
+on the other side: such causes are simulated at some sizes. If even the fit with κ = 4 is not close to the records,
+all causes are simulated so, and the best are fitted by themselves, before a force or a change point is fitted. The
+same is done from the nominal model where something seems wrong: a wide fit may represent one large cause by many
+small ones.
 """
 
 from __future__ import annotations
@@ -53,11 +54,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Screening:
-    """What the linear problem says.
+    """Linear evidence of hypotheses.
 
     Attributes:
         log_posterior: hypothesis → log (evidence, mixed over κ, times prior).
-        starts: hypothesis → where its fit begins, for causes without a slope.
+        starts: hypothesis → start of its fit, for causes without a slope.
         columns: place of an entry without a slope → its sensitivities, by the secant up to there (m,).
         count: of causes that can be named.
         far: the wide fit was not close to the records: sums of causes are no more than guesses.
@@ -70,20 +71,22 @@ class Screening:
     far: bool = False
 
     def adds(self, ids: Ids, part: Ids) -> float:
-        """Return what a hypothesis has over a part of it; from afar only what the prior says."""
+        """Return the gain in log posterior of a hypothesis over a part of it; if the wide fit was far from the
+        records, only that of the prior.
+        """
         if self.far:
             return log_prior(ids, self.count) - log_prior(part, self.count)
         return self.log_posterior[ids] - self.log_posterior[part]
 
     def best(self, size: int, most: int, keep: float) -> list[Ids]:
-        """Return the best hypotheses of a size, at most so many, this close to the best of all of that size."""
+        """Return the best hypotheses of a size, at most `most`, within `keep` nats of the best of that size."""
         of_size = (ids for ids in self.log_posterior if len(ids) == size)
         ranked = sorted(of_size, key=lambda ids: -self.log_posterior[ids])[:most]
         return [ids for ids in ranked if self.log_posterior[ids] > self.log_posterior[ranked[0]] - keep]
 
 
 def is_close(problem: Problem, wide: Fit) -> bool:
-    """Say whether a wide fit leaves nothing but noise, and bends little."""
+    """Say whether a wide fit leaves only noise, and moves few parameters far."""
     bent = np.abs(wide.z) > settings.STRAINED_TOLERANCES * np.array(
         [entry.parameter.tolerance for entry in problem.entries]
     )
@@ -95,13 +98,13 @@ def is_close(problem: Problem, wide: Fit) -> bool:
 def screening_of(
     problem: Problem, wide: Fit, nominal: tuple[np.ndarray, np.ndarray], *, far: bool
 ) -> Screening:
-    """Return the screen: nothing, every cause, and every pair.
+    """Return the linear evidence of no cause, every cause, and every pair.
 
     Args:
         problem: records and parameters.
         wide: the fit with wide tolerances.
         nominal: residual (m,) and sensitivities (m, k) of the nominal model.
-        far: the wide fit did not come close.
+        far: the wide fit is not close to the records.
     """
     if far:
         return _from_afar(problem, *nominal)
@@ -116,8 +119,8 @@ def screening_of(
 
 
 def _from_afar(problem: Problem, r: np.ndarray, J: np.ndarray) -> Screening:
-    """Return the screen if even wide tolerances do not come close: every cause is tried at some sizes by real runs, and
-    a pair is as good as the better of the two.
+    """Return the screening if even the wide fit is not close to the records: every cause is simulated at some sizes,
+    and a pair has the evidence of the better of the two.
     """
     names, zero = nameable(problem.entries), np.zeros(J.shape[1])
     found = Screening(count=len(names), far=True)
@@ -130,8 +133,9 @@ def _from_afar(problem: Problem, r: np.ndarray, J: np.ndarray) -> Screening:
 
 
 def swept_from_nominal(problem: Problem, r: np.ndarray, J: np.ndarray) -> Screening:
-    """Return what single causes explain at the best of some sizes, all else within tolerances about the nominal model
-    with residual r (m,) and sensitivities J (m, k): a wide fit may take one large cause for many small ones.
+    """Return the screening of single causes at the best of some sizes, all other parameters within tolerances about
+    the nominal model with residual r (m,) and sensitivities J (m, k): a wide fit may represent one large cause by
+    many small ones.
     """
     found = Screening(count=len(nameable(problem.entries)))
     zero = np.zeros(J.shape[1])
@@ -145,14 +149,14 @@ def _of_the_model(problem: Problem) -> list[int]:
 
 
 class Base(NamedTuple):
-    """What the data say with some causes free under a κ, and the prior variances of that (k,)."""
+    """The posterior with some causes free under a κ, and its prior variances (k,)."""
 
     known: Posterior
     D: np.ndarray
 
 
 def _bases(problem: Problem, q: Quadratic, ids: Ids) -> dict[float, Base]:
-    """Return κ → what the data say with some causes free."""
+    """Return κ → posterior with some causes free."""
     under = {kappa: variances(problem.entries, ids, kappa) for kappa in KAPPAS}
     return {kappa: Base(posterior(q, D), D) for kappa, D in under.items()}
 
@@ -160,7 +164,9 @@ def _bases(problem: Problem, q: Quadratic, ids: Ids) -> dict[float, Base]:
 def linear_evidences(
     problem: Problem, base: Mapping[float, Base], held: Ids, several: Sequence[Ids]
 ) -> dict[Ids, float]:
-    """Return hypothesis → log evidence, mixed over κ, with its causes freed beside those that are free in `base`."""
+    """Return hypothesis → log evidence, mixed over κ, with its causes freed in addition to those that are free in
+    `base`.
+    """
     entries, by_sizes = problem.entries, dict[tuple[int, ...], list[tuple[Ids, list[int]]]]()
     own = {
         cause: columns_of(entries, (cause,))
@@ -188,8 +194,8 @@ def linear_evidences(
 def _freed_evidence(
     problem: Problem, base: Base, kappa: float, places: np.ndarray, sizes: Sequence[int]
 ) -> np.ndarray:
-    """Return the log evidence (n,) of n hypotheses that free the entries at places (n, p) under a κ, of causes with so
-    many parameters each.
+    """Return the log evidence (n,) of n hypotheses that free the entries at places (n, p) under a κ, of causes with
+    so many parameters each.
     """
     every, bounded = range(len(problem.entries)), (_lowest(problem) == 0.0)[places]
     prior = variances_named(problem.entries, every, kappa)[places]
@@ -205,7 +211,7 @@ def _freed_evidence(
 
 
 def without_slope(problem: Problem, J: np.ndarray) -> list[int]:
-    """Return the entries that do nothing when they are small."""
+    """Return the entries that have no effect when they are small."""
     return [
         k
         for k, entry in enumerate(problem.entries)
@@ -222,9 +228,13 @@ def _sweep(
     here: np.ndarray,
     scales: Sequence[float],
 ) -> None:
-    """Try sizes of entries about z, side by side, with the residual `here` there; keep the best of every cause."""
+    """Simulate sizes of entries about z, in parallel, given the residual `here` at z; keep the best of every
+    cause.
+    """
     names, flat, at_z = nameable(problem.entries), without_slope(problem, J), Quadratic.at(z, here, J)
-    best: dict[Ids, float] = {(problem.entries[k].effect.id,): -np.inf for k in at}  # that cannot be run
+    best: dict[Ids, float] = {
+        (problem.entries[k].effect.id,): -np.inf for k in at
+    }  # if no size can be simulated
     for cause in sizes_run(problem, z, here, at, scales):
         ids: Ids = (problem.entries[cause.k].effect.id,)
         value = _evidence_there(problem, _quadratic_of(cause, at_z, J), (), ids) + log_prior(ids, len(names))
@@ -236,13 +246,13 @@ def _sweep(
 
 
 def _evidence_there(problem: Problem, q: Quadratic, held: Ids, ids: Ids) -> float:
-    """Return the log evidence of a hypothesis, which has the causes `held` and may have one more, mixed over κ."""
+    """Return the log evidence of a hypothesis with the causes `held` and at most one more, mixed over κ."""
     return linear_evidences(problem, _bases(problem, q, held), held, [ids])[ids]
 
 
 def _quadratic_of(run: SizeRun, near: Quadratic, J: np.ndarray) -> Quadratic:
-    """Return the linear problem where a size was run, with all other sensitivities J (m, k), of which `near` has the
-    products.
+    """Return the linear problem at a simulated size, with all other sensitivities J (m, k), whose products are in
+    `near`.
     """
     k, column = run.k, run.column
     whole = run.r + J @ run.z + (column - J[:, k]) * run.z[k]
@@ -253,14 +263,14 @@ def _quadratic_of(run: SizeRun, near: Quadratic, J: np.ndarray) -> Quadratic:
 
 
 def mixed_evidence(problem: Problem, q: Quadratic, ids: Ids = ()) -> float:
-    """Return the log evidence of some causes, or with nothing but tolerances, mixed over κ."""
+    """Return the log evidence of some causes, or of none, mixed over κ."""
     return log_sum(
         [np.log(prior) + linear_evidence(problem, q, ids, kappa) for kappa, prior in KAPPAS.items()]
     )
 
 
 def linear_evidence(problem: Problem, q: Quadratic, ids: Ids, kappa: float) -> float:
-    """Return the log evidence of some causes, or of nothing, under a κ."""
+    """Return the log evidence of some causes, or of none, under a κ."""
     D = variances(problem.entries, ids, kappa)
     said = posterior(q, D)
     causes = [columns_of(problem.entries, (cause_id,)) for cause_id in ids]
@@ -277,7 +287,7 @@ def with_one_added(problem: Problem, candidate: Candidate) -> dict[Ids, float]:
 
 
 def with_one_swapped(problem: Problem, candidate: Candidate, rest: Ids) -> dict[Ids, float]:
-    """Return hypothesis → log posterior of all with another cause beside the rest of a candidate, likewise."""
+    """Return hypothesis → log posterior of all with another cause added to the rest of a candidate, likewise."""
     q, names, found = candidate.fit.quadratic, nameable(problem.entries), {}
     for other in names:
         ids = tuple(sorted({*rest, other}))
@@ -301,14 +311,14 @@ def with_sizes_tried(
     at: Sequence[int],
     scales: Sequence[float],
 ) -> dict[Ids, TriedSize]:
-    """Return hypothesis → its best size, for the causes of entries beside the rest of a candidate.
+    """Return hypothesis → its best size, for the causes of entries added to the rest of a candidate.
 
     Args:
         problem: records and parameters.
         candidate: the candidate.
         rest: those of its causes that are kept.
-        at: places of the entries that are tried.
-        scales: sizes that they are tried at, in effect scales, either way.
+        at: places of the entries that are simulated.
+        scales: their sizes, in effect scales, either way.
     """
     entries, names, J = problem.entries, nameable(problem.entries), candidate.fit.J
     z = np.maximum(
@@ -330,13 +340,15 @@ def _lowest(problem: Problem) -> np.ndarray:
 
 
 KAPPA_WIDE = 4.0
-"""κ of the fit that the linear evidence is made at."""
+"""κ of the fit that is the linearisation point of the screening."""
 Nominal = tuple[np.ndarray, np.ndarray]
 """Residual (m,) and sensitivities (m, k) of the nominal model."""
 
 
 def fit_wide(problem: Problem, progress: Progress) -> tuple[Problem, Fit, Nominal]:
-    """Return the problem with the noise that is left behind the fit, the fit, and what the nominal model leaves."""
+    """Return the problem with the noise estimated from the wide fit, that fit, and the residual and sensitivities of
+    the nominal model.
+    """
     progress(0.05, "sensitivities of the nominal model")
     zero = np.zeros(len(problem.entries))
     J = problem.jacobian(zero)
@@ -352,7 +364,9 @@ def fit_wide(problem: Problem, progress: Progress) -> tuple[Problem, Fit, Nomina
 
 
 def _from(problem: Problem, z: np.ndarray, J: np.ndarray, progress: Progress) -> Fit:
-    """Return the fit from z, with the sensitivities there; or if it went astray, a better one from off its kinks."""
+    """Return the fit from z, with the sensitivities there; or, if it ends in a bad local minimum, a better one
+    restarted from smooth values of the non-smooth parameters.
+    """
     progress(0.15, "fit within wide tolerances")
     fit = refit(problem, z, J, variances(problem.entries, (), KAPPA_WIDE), most_fresh=2, made_at=z)
     if not at_bad_minimum(problem, fit, ()):

@@ -1,9 +1,9 @@
-"""Everything that only steers the search: how far it looks, how often it tries, and when it lets go.
+"""Settings of the search: how wide it is, how often it repeats a step, and when it stops.
 
-None of these numbers belongs to the statistical model: with an endless budget, and simulations without non-smooth
-points, the verdict would not depend on them. They buy time. What belongs to the model stands with its concept: prior
-probabilities, the most causes and what has no slope (`hypotheses`), what a poor fit is (`map_fit`), priors of noise
-(`noise`) and of latent forces (`linear_gaussian`), rules for a verdict (`model_average`). So do the steps of
+None of these numbers belongs to the statistical model: with an unlimited budget, and simulations without non-smooth
+points, the verdict would not depend on them. They save time. Constants of the model are defined with their concept:
+prior probabilities, the most causes and causes without a slope (`hypotheses`), a poor fit (`map_fit`), priors of
+noise (`noise`) and of latent forces (`linear_gaussian`), rules for a verdict (`model_average`). So are the steps of
 differences and grids (`problem`, `change_point_scan`, `latent_force`). `benchmarks/diagnosis/settings.py` halves and
 doubles each.
 
@@ -16,39 +16,43 @@ NEGLIGIBLE_GAIN_NATS = 0.1
 CONVERGED_GAIN_NATS = 0.5
 """A fit has converged if its linear model predicts a smaller gain and no step gains anything."""
 CLOSE_NATS = 2.0
-"""Explanations this close to the best may turn out better once they have settled: they are refined, and refitted where
-the linear model predicts this much more."""
+"""Explanations this close to the best may turn out better once they have converged: they are refined, and refitted
+where the linear model predicts this much more.
+"""
 SCAN_GAIN_NATS = 3.0
 """A change point that gains less on the coarse grid of onsets is not scanned on the fine one."""
 FURTHER_CAUSE_NATS = 4.0
 """A further cause is fitted even if the linear evidence is against it by this much: linear evidence errs."""
 HOPELESS_NATS = 6.0
-"""What is this far behind the best is given up; what the linear model has this far before its own fit was fitted into
-a local minimum, and is fitted again."""
+"""A hypothesis this far below the best is given up; one whose linear evidence exceeds that of its own fit by this
+much is in a local minimum, and is fitted again.
+"""
 LINEAR_NATS = 12.0
-"""Linear evidence far from a fit may err by this much: within it, screened hypotheses and one cause in the place of two
-are fitted, forces, drifts and large hypotheses are looked at around fits of their own, and onsets on the fine grid."""
+"""Linear evidence far from a fit may err by this much: within it, screened hypotheses and one cause instead of two
+are fitted, forces, drifts and large hypotheses are linearised at fits of their own, and onsets are scanned on the
+fine grid.
+"""
 DECISIVE_NATS = 30.0
 """No sum of causes gains more over an explanation that leaves only noise; a fit that predicts this much more is
 continued."""
 FAR_NATS = 45.0
-"""A latent force is not linearised at its own fit if its linear evidence is this far behind the best."""
+"""A latent force is not linearised at its own fit if its linear evidence is this far below the best."""
 MAX_PREDICTED_GAIN_NATS = 300.0
 """A gain predicted with an old Jacobian counts up to this much."""
 
 # Distances of parameters. [τ]
 RESTART_TOLERANCES = 0.5
-"""Non-smooth parameters are restarted here: off the kink, where most vehicles are."""
+"""Restart value of non-smooth parameters: away from the non-smooth point, as in most vehicles."""
 OWN_JACOBIAN_TOLERANCES = 1.0
 """A Jacobian made this close to a fit is its own."""
 STRAYED_TOLERANCES = 2.0
-"""A fit that moves non-smooth parameters of no named cause farther sits at a bad local minimum."""
+"""A fit that moves non-smooth parameters of no named cause farther is in a bad local minimum."""
 JACOBIAN_HOLDS_TOLERANCES = 4.0
 """A Jacobian serves to compare fits this far from where it was made."""
 STRAINED_TOLERANCES, MAX_STRAINED = 5.0, 6
 """A wide fit that moves MAX_STRAINED parameters by more than this is close to the records by chance."""
 BENT_TOLERANCES = 10.0
-"""A cause that the wide fit moves by more than this is fitted by itself: linear evidence says little there."""
+"""A cause that the wide fit moves by more than this is fitted by itself: linear evidence is inaccurate there."""
 
 # Sizes and shares. [-]
 POOR_MEAN_SQUARE = 1.08
@@ -60,8 +64,9 @@ NON_LINEAR_SHARE, NON_LINEAR_SHARE_OF_FIRST = 0.05, 0.75
 SWEEP_SCALES = (0.25, 0.5, 1.0, 2.0)
 """Effect scales, either way, at which causes without a slope are simulated."""
 MERGED_SCALES = (0.5, 1.5)
-"""Effect scales, either way, at which one cause is simulated in the place of all that changes: of two causes, and from
-the nominal model, of what a wide fit bends."""
+"""Effect scales, either way, at which a single cause is simulated as the whole explanation: instead of two causes,
+and from the nominal model, instead of the parameters that a wide fit moves.
+"""
 LATER_SIZES = (1.0, 1.5)
 """A cause of a hypothesis is simulated from an onset on at these multiples of its size there."""
 
@@ -69,15 +74,19 @@ LATER_SIZES = (1.0, 1.5)
 MAX_STEPS = 8
 """Most steps of a fit."""
 MAX_ADDED = 2
-"""Most fits with something more (a further cause, a bent cause by itself, along a force, from a large hypothesis), and
-how often one is repeated with what it showed: rivals from one another's optimum, the noise behind the wide fit."""
+"""Most fits with an addition (a further cause, a single cause that the wide fit moves far, along a force, from a
+large hypothesis), and most repeats of a fit with its own result: rivals from one another's optimum, the noise of the
+wide fit.
+"""
 MAX_TRIED = 3
-"""Most fits of one kind in one look (swapped causes, restarts, change points, forces, rivals to refute), most peaks of
-an onset, and most looks: at change points, at what has not settled, and where a fit might go on."""
+"""Most fits of one kind in one round (swapped causes, restarts, change points, forces, rivals to refute), most peaks
+of an onset, and most rounds: of change points, of candidates that have not converged, and of a fit that may continue.
+"""
 MAX_PAIRS = 4
-"""Most screened pairs that are fitted; from afar, most causes by themselves."""
+"""Most screened pairs that are fitted; if the wide fit is far from the records, most single causes."""
 MAX_RANKED = 7
-"""So far down a ranking of hypotheses it goes: screened causes are fitted; fits are given a Jacobian of their own, are
-begun from one another's optimum, and have the noise behind them estimated."""
+"""Most hypotheses of a ranking: screened causes that are fitted; fits that are given a Jacobian of their own, are
+started from one another's optimum, and have their own noise estimated.
+"""
 MAX_RUNS_PER_RECORD = 800
-"""After so many simulations of each record only what predicts to be the best is refined."""
+"""After so many simulations of each record only a candidate that is predicted to be the best is refined."""

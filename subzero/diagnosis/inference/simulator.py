@@ -1,10 +1,11 @@
-"""A simulation as a diagnosis needs it: a compiled loop that keeps what sensors see, resumed where runs part, cached.
+"""A simulation for a diagnosis: a compiled loop that records the measured quantities, resumed where simulations start
+to differ, cached.
 
-As `subzero.engine.time_loop`, without forces, energies and shapes, but with the hull's states inside an exchange: a
-rudder moves faster than cable and hull exchange their forces.
+It does the same as `subzero.engine.time_loop`, without forces, energies and shapes, but with the hull's states inside
+an exchange: a rudder moves faster than cable and hull exchange their forces.
 
-A force that begins at 20 s changes nothing before: its sensitivity needs the last 10 of 30 s only. Runs are kept for a
-while: fits come back to where they were, and sensors change no run.
+A force that begins at 20 s changes nothing before: its sensitivity needs the last 10 of 30 s only. Simulations are
+cached: fits return to former points, and errors of sensors change no simulation.
 """
 
 from __future__ import annotations
@@ -46,14 +47,16 @@ if TYPE_CHECKING:
 
 
 TOO_LONG = NO_ROOM + 1
-"""How a run ends that takes more than it may, beside the endings of `coupling` and `NO_ROOM`."""
+"""Ending of a simulation that exceeds its limit of work, in addition to the endings of `coupling` and `NO_ROOM`."""
 USUAL_WORK = 25 * 60
-"""Work that any run may take for an exchange, on average: iterations of the cable's solver times nodes. Usual runs take
-2 to 5 iterations, those of a cause of any size up to 18, for 15 to 60 nodes. Where several numbers are absurd at once a
-cable may whip about, take 200, and seconds: such a run counts as one that cannot go on."""
+"""Work allowed to any simulation for an exchange, on average: iterations of the cable's solver times nodes. Usual
+simulations take 2 to 5 iterations, those of a cause of any size up to 18, for 15 to 60 nodes. Where several numbers
+are absurd at once a cable may whip about, take 200, and seconds: such a simulation counts as failed.
+"""
 TIMES_NOMINAL = 10
-"""... and a run may take so many times the work of the nominal one: a heavy cable, slack behind a vehicle that stops,
-takes 25 to 120 iterations for an exchange, and nothing is wrong with it."""
+"""... and a simulation may take so many times the work of the nominal one: a heavy cable, slack behind a vehicle that
+stops, takes 25 to 120 iterations for an exchange, and is valid.
+"""
 
 
 @compiled
@@ -63,16 +66,16 @@ def record_track(
     """Fill the rows of a track that belong to the exchanges first … last − 1.
 
     Args:
-        setup: what stays.
-        live: what changes; at times[first − 1] when called.
+        setup: constants of the simulation.
+        live: its state; at times[first − 1] when called.
         times: of the exchanges, evenly spaced (n,). [s]
         first: exchange to begin with, from 1.
         last: exchange to end before.
         track: (1 + (n − 1) · hull steps, COLUMNS); row 0 is filled when first is 1.
-        most_work: that the run may take since its start, as in `work`.
+        most_work: allowed since the start of the simulation, as in `work`.
 
     Returns:
-        exchanges that are done, and how it ended (`coupling.FINE` …, `NO_ROOM`, `TOO_LONG`).
+        the exchanges that are done, and how it ended (`coupling.FINE` …, `NO_ROOM`, `TOO_LONG`).
     """
     steps = hull_steps(setup, times[1] - times[0])
     if first == 1:
@@ -104,13 +107,13 @@ def record_track(
 
 @compiled
 def work(live: Live) -> float:
-    """Return what a run has taken: iterations times the nodes of its cable, as it is now."""
+    """Return the work of a simulation so far: iterations times the nodes of its cable as it is now."""
     return live.now.iterations * live.line.ends.count
 
 
 @inner
 def _write(setup: Setup, live: Live, time: float, state: np.ndarray, out: np.ndarray) -> None:
-    """Write a state and what else sensors see; tension and length as they are at the end of the exchange."""
+    """Write a state and the other measured quantities; tension and length as they are at the end of the exchange."""
     command, force = setup.orders.values[row_at(setup.orders.time, time)], live.now.force
     sample_current(setup, state, time, live.now.hull)
     for j in range(STATE_SIZE):
@@ -127,22 +130,25 @@ HULL_STEP_S, CABLE_STEP_S, SEGMENT_M = 0.05, 0.2, 1.0
 """Steps of a diagnosis: errors of 1e-4 m/s and 0.03 degrees on fig6, a twentieth of the sensors' noise, in a third of
 the time."""
 FINE_STEPS = (0.025, 0.1, 0.25)
-"""Hull step, cable step [s] and segment length [m] to measure their errors with."""
+"""Hull step, cable step [s] and segment length [m] to measure the error of the economical steps with."""
 ROUGH_HULL_STEP_S, ROUGH_SEGMENT_M = 0.1, 2.0
-"""Steps of the hull and segments that serve for what forces and onsets change, beside the cable steps of a diagnosis:
-in six tenths of the time, half of the sensitivities err by less than 1 %, nine of ten by less than 2 to 6 % (12 % where
-a current drags a long cable, where those in the steps of a diagnosis err by 3 %)."""
+"""Steps of the hull and segments for the sensitivities to forces and onsets, with the cable steps of a diagnosis: in
+six tenths of the time, half of the sensitivities err by less than 1 %, nine of ten by less than 2 to 6 % (12 % where
+a current drags a long cable, where those in the steps of a diagnosis err by 3 %).
+"""
 AGREEMENT = 1e-6
-"""Fraction within which the forces of hull and cable agree, in the place of 1e-9: a quarter faster, nothing seen. With
-1e-5, and the cable's balances to 1e-6, a fit of 12 m more cable ended 122 nats behind: sensitivities need it."""
+"""Fraction within which the forces of hull and cable agree, instead of 1e-9: a quarter faster, with no visible
+change. With 1e-5, and the cable's balances to 1e-6, a fit of 12 m more cable ended 122 nats lower: sensitivities need
+it.
+"""
 FASTEST_PAY_OUT = 2.0
-"""Room for nodes is made for this speed, and doubled when that is not enough. [m/s]"""
+"""Memory for nodes is allocated for this speed, and doubled when that is not enough. [m/s]"""
 Track = tuple[np.ndarray, np.ndarray]
-"""Times (m,) [s] and what is tracked at them (m, COLUMNS), NaN from where the run could not go on."""
+"""Times (m,) [s] and the tracked quantities (m, COLUMNS), NaN from where the simulation failed."""
 
 
 class Stop(NamedTuple):
-    """A run as it was after some exchanges; `track` is what it had by then (rows, COLUMNS)."""
+    """A simulation as it was after some exchanges; `track` has its rows so far (rows, COLUMNS)."""
 
     exchanges: int
     setup: Setup
@@ -156,8 +162,10 @@ def simulate_track(setting: Setting) -> Track:
 
 
 def with_limit(setting: Setting) -> tuple[Setting, Track]:
-    """Return a nominal setting with what runs of it, and of all that is made of it, may take; and its track."""
-    begin, grid, steps = _begun(setting)
+    """Return a nominal setting with a limit of work for simulations of it and of all settings derived from it; and
+    its track.
+    """
+    begin, grid, steps = _prepared(setting)
     _run(setting, begin, grid, steps, ())
     nominal = work(begin.live) / (grid.size - 1)
     limited = replace(setting, most_work=max(USUAL_WORK, TIMES_NOMINAL * nominal))
@@ -165,21 +173,25 @@ def with_limit(setting: Setting) -> tuple[Setting, Track]:
 
 
 def with_stops(setting: Setting, times: Collection[float]) -> tuple[Track, dict[float, Stop]]:
-    """Return the track of a setting, and the run as it was at times [s], or at the last exchange before each."""
-    begin, grid, steps = _begun(setting)
+    """Return the track of a setting, and the simulation as it was at times [s], or at the last exchange
+    before each.
+    """
+    begin, grid, steps = _prepared(setting)
     done = {time: int(time / setting.trial.cable_step + 1e-6) for time in times}
     stops = _run(setting, begin, grid, steps, set(done.values()))
     kept = {time: stops[count] for time, count in done.items() if count in stops}
     return (_spread(grid, begin), begin.track), kept
 
 
-def _begun(setting: Setting) -> tuple[Stop, np.ndarray, int]:
-    """Return the run of a setting before its first exchange, the times of exchanges, and the hull's steps in one."""
+def _prepared(setting: Setting) -> tuple[Stop, np.ndarray, int]:
+    """Return the simulation of a setting before its first exchange, the times of exchanges, and the hull's steps in
+    one.
+    """
     trial = setting.trial
-    # Even segments, however the cable begins: a mesh that changes with its initial length has no slope.
-    room = 16 + int(FASTEST_PAY_OUT * trial.duration / trial.segment_length)
+    # Even segments, whatever the initial length: with a mesh that changes with the length the response has no slope.
+    nodes = 16 + int(FASTEST_PAY_OUT * trial.duration / trial.segment_length)
     setup, live = prepare(
-        trial, setting.model, setting.tethered, longest_exchange=trial.cable_step, run_in=0.0, room=room
+        trial, setting.model, setting.tethered, longest_exchange=trial.cable_step, run_in=0.0, room=nodes
     )
     _ease(setup)
     grid, steps = _exchanges(setting)
@@ -188,12 +200,12 @@ def _begun(setting: Setting) -> tuple[Stop, np.ndarray, int]:
 
 
 def _spread(grid: np.ndarray, run: Stop) -> np.ndarray:
-    """Return the times of the rows of a run's track. [s]"""
+    """Return the times of the rows of a simulation's track. [s]"""
     return np.linspace(0.0, grid[-1], run.track.shape[0])
 
 
 def simulate_on(setting: Setting, stop: Stop) -> Track:
-    """Return the track of a setting that is the same as another until a stop of that one's run."""
+    """Return the track of a setting that is the same as another until a stop of that one's simulation."""
     grid, steps = _exchanges(setting)
     time, track = grid[stop.exchanges], np.full((1 + (grid.size - 1) * steps, COLUMNS), np.nan)
     track[: stop.track.shape[0]] = stop.track
@@ -210,7 +222,7 @@ def simulate_on(setting: Setting, stop: Stop) -> Track:
 def _run(
     setting: Setting, begin: Stop, times: np.ndarray, steps: int, wanted: Collection[int]
 ) -> Mapping[int, Stop]:
-    """Fill the rows of a track from where it begins, and return the run as it was after the wanted exchanges."""
+    """Fill the rows of a track from `begin` on, and return the simulation as it was after the wanted exchanges."""
     trial, (done, setup, live, track), stops = setting.trial, begin, dict[int, Stop]()
     changes = {round(time / trial.cable_step): model for time, model in setting.later}
     row, ending = done + 1, coupling.FINE
@@ -231,8 +243,8 @@ def _run(
 
 
 def _exchanges(setting: Setting) -> tuple[np.ndarray, int]:
-    """Return the times of the exchanges (n,), evenly spaced to the end of the trial or beyond [s], and the hull's steps
-    between two of them.
+    """Return the times of the exchanges (n,), evenly spaced to the end of the trial or beyond [s], and the hull's
+    steps between two of them.
     """
     trial = setting.trial
     count = max(1, math.ceil(trial.duration / trial.cable_step - 1e-6))
@@ -252,7 +264,9 @@ def _model_from(setting: Setting, time: float) -> Model:
 
 
 def _ease(setup: Setup) -> None:
-    """Let a run be quicker and smoother than a simulation needs to be: forces agree less, nobody asks for energies."""
+    """Make a simulation quicker, at less accuracy than a user's: forces agree less closely, and energies are not
+    computed.
+    """
     fixed: Any = setup.fixed  # a record in memory
     fixed.agreement, fixed.booked = AGREEMENT, False
 
@@ -263,8 +277,8 @@ def _copied(value: Any) -> Any:
 
 
 def economical(setting: Setting, duration: float) -> Setting:
-    """Return a setting in the steps of a diagnosis, as long as asked; commands stay at their times, the last one holds
-    to the end.
+    """Return a setting in the steps of a diagnosis, with a given duration; commands keep their times, and the last
+    one holds to the end.
     """
     trial = setting.trial
     on_grid = trial.commands is None or multiples(trial.commands.time, HULL_STEP_S)
@@ -283,7 +297,7 @@ def economical(setting: Setting, duration: float) -> Setting:
 
 
 def rougher(setting: Setting) -> Setting:
-    """Return a setting in steps of a diagnosis with rougher ones for the hull and the cable's shape."""
+    """Return a setting in the steps of a diagnosis, with coarser ones for the hull and the cable's shape."""
     trial = setting.trial
     on_grid = trial.commands is None or multiples(trial.commands.time, ROUGH_HULL_STEP_S)
     hull_step = max(trial.hull_step, ROUGH_HULL_STEP_S) if on_grid else trial.hull_step
@@ -296,7 +310,7 @@ def rougher(setting: Setting) -> Setting:
 
 
 def finer(setting: Setting) -> Setting:
-    """Return a setting in steps that are fine, to see what economical ones get wrong."""
+    """Return a setting in fine steps, to measure the error of economical ones."""
     hull_step, cable_step, segment = FINE_STEPS
     trial = setting.trial
     cable_step = min(trial.cable_step, cable_step)
@@ -317,7 +331,7 @@ def multiples(times: np.ndarray, step: float) -> bool:
 
 
 def respond(setting: Setting, times: np.ndarray, channels: Iterable[str]) -> dict[str, np.ndarray]:
-    """Return what the sensors would show.
+    """Return the readings of the sensors.
 
     Args:
         setting: of the trial.
@@ -325,27 +339,29 @@ def respond(setting: Setting, times: np.ndarray, channels: Iterable[str]) -> dic
         channels: names of `subzero.channels`, of those in `TRUTHS`.
 
     Returns:
-        channel → values (n,) in its display unit; NaN from where the run could not go on. Behind its end the last hold.
+        channel → values (n,) in its display unit; NaN from where the simulation failed. The last values hold after
+            its end.
     """
     return read(setting, simulate_track(setting), times, channels)
 
 
 def read(setting: Setting, run: Track, times: np.ndarray, channels: Iterable[str]) -> dict[str, np.ndarray]:
-    """Return what the sensors show of a run, as `respond`."""
+    """Return the readings of the sensors along a simulation, as `respond`."""
     grid, track = run
     shown = {name: sensed(setting.sensing.get(name), grid, truth(setting, track, name)) for name in channels}
     return {name: np.interp(setting.happened(times, name), grid, values) for name, values in shown.items()}
 
 
 CACHE_BYTES, SETTINGS_KEPT = 250_000_000, 500
-"""Runs are kept until they take more memory than this [byte], settings until they are so many; the oldest go first. A
-search asks for some 1500 runs, of 180 kB each where the record lasts a minute; with a quarter of this, one run of six
-was made again."""
+"""Simulations are kept until they take more memory than this [byte], settings up to this number; the oldest go first.
+A search requests some 1500 simulations, of 180 kB each where the record lasts a minute; with a quarter of this
+memory, one of six was repeated.
+"""
 
 
 @dataclass(kw_only=True, eq=False)
 class _Store:
-    """Runs and settings that were made, of `size` bytes, behind a lock."""
+    """Simulations and settings that were made, of `size` bytes, protected by a lock."""
 
     tracks: OrderedDict[tuple[int, int, bytes], tuple[Track, Any]] = field(default_factory=OrderedDict)
     settings: OrderedDict[tuple[int, int, bytes], tuple[Setting, Any]] = field(default_factory=OrderedDict)
@@ -354,30 +370,32 @@ class _Store:
 
 
 class RunCache:
-    """Tracks by setting and entries, the very objects that they are, and deviations; several threads may ask and keep.
+    """Tracks by setting and entries (by identity of the objects) and deviations; safe for several threads.
 
     Attributes:
-        asked: how many runs were asked for.
-        onsets: what causes that begin in mid-trial change along some runs, of `change_point_scan`.
+        asked: how many simulations were requested.
+        onsets: responses to onsets along some simulations, of `change_point_scan`.
     """
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Begin empty."""
         self.asked, self.onsets, self._store = 0, list[Any](), _Store()
 
     def again(self) -> RunCache:
-        """Return what counts from none, and shares the tracks."""
+        """Return a cache that counts from 0 and shares the tracks."""
         new = RunCache()
         new.onsets, new._store = self.onsets[:], self._store
         return new
 
     def count(self, runs: int) -> None:
-        """Count runs that are asked for; the search hangs on their number, so none may be lost between threads."""
+        """Count requested simulations; the search depends on their number, so none may be lost between threads."""
         with self._store.lock:
             self.asked += runs
 
     def setting(self, nominal: Setting, entries: Any, z: np.ndarray, make: Callable[[], Setting]) -> Setting:
-        """Return what was made of a nominal setting, entries, the very objects that they are, and deviations."""
+        """Return the setting that was made of a nominal setting, entries (by identity of the objects) and
+        deviations.
+        """
         key, store = (id(nominal), id(entries), z.tobytes()), self._store
         with store.lock:
             found = store.settings.get(key)
@@ -390,13 +408,13 @@ class RunCache:
         return found[0]
 
     def get(self, setting: Any, entries: Any, z: np.ndarray) -> Track | None:
-        """Return the track that was made of these; None if there is none, or no more."""
+        """Return the track that was made of these; None if there is none, or if it was dropped."""
         with self._store.lock:
             found = self._store.tracks.get((id(setting), id(entries), z.tobytes()))
         return found[0] if found else None
 
     def keep(self, setting: Any, entries: Any, z: np.ndarray, track: Track) -> None:
-        """Keep a track, and with it what made it, so that no other value can take its identity."""
+        """Keep a track with the objects that it was made of, so that no other object can take their identity."""
         key, store = (id(setting), id(entries), z.tobytes()), self._store
         with store.lock:
             if key not in store.tracks:

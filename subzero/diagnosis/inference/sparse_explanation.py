@@ -1,11 +1,12 @@
-"""What a few causes explain of a record, in the linear problem: what an error in its data is held against.
+"""The gain of a few causes for a record, in the linear problem: compared with the gain of an error in its data.
 
     G = max over sets of at most MAX_CAUSES terms of  log p(y | terms) p(terms) − log p(y | nothing) p(nothing)
 
-A term is a cause, throughout or from some time of a grid on, which is what a late clock looks like. The set grows by
-the term that gains most; the scales of the noise are found anew behind each set, as in `data_error_saturated_model`,
-which has nothing and single causes only (`most_of_physics`). Of a large cause the linear problem at the nominal model
-says little: it is simulated at some sizes, and linearised again where that has it (`most_of_one_cause`).
+A term is a cause, throughout or from an onset of a grid on, as a late clock looks like a change point. The term that
+gains most is added to the set, until no term gains; the scales of the noise are estimated again for each set, as in
+`data_error_saturated_model`, which has only no cause and single causes (`most_of_physics`). For a large cause the
+linear problem at the nominal model is inaccurate: it is simulated at some sizes, and linearised again at the optimum
+(`most_of_one_cause`).
 """
 
 from __future__ import annotations
@@ -47,10 +48,10 @@ class Linear:
 
     Attributes:
         r: residual (m,).
-        J: sensitivities to what is free (m, k).
+        J: sensitivities to the free parameters (m, k).
         D: prior variances (k,).
         own: channel → its rows.
-        bare: channel → what it says of nothing, but for its sums.
+        bare: channel → its `Term` without the products of r and J.
     """
 
     r: np.ndarray
@@ -60,7 +61,7 @@ class Linear:
     bare: Mapping[str, Term]
 
     def reckoned(self) -> Evidence:
-        """Return its evidence, with the scales of the noise that are best."""
+        """Return its evidence, with the best scales of the noise."""
         return evidence_of_terms(
             stacked({name: self._term(name, rows) for name, rows in self.own.items()}), self.D
         )
@@ -78,7 +79,7 @@ class Linear:
 
 
 class Further(NamedTuple):
-    """A further term: its log prior, and about the log evidence with it; the linear problem then."""
+    """A further term: its log prior, the approximate log evidence with it, and the linear problem with it."""
 
     log_prior: float
     log_evidence: float
@@ -86,14 +87,14 @@ class Further(NamedTuple):
 
 
 def most_of_physics(problem: Problem, record: int) -> float:
-    """Return by how much a few causes, throughout or from mid-trial on, are more probable than none. [nat]
+    """Return the log odds of a few causes, throughout or from mid-trial on, against none. [nat]
 
     Args:
         problem: of all records as they are, as posed.
         record: its number.
     """
     here = _linear(problem, record)
-    started = _begun(problem, record, here)
+    started = _onset_responses(problem, record, here)
     now, log_prior = here.reckoned(), float(np.log(PRIOR["none"]))
     best = none = now.log + log_prior
     for _ in range(MAX_CAUSES):
@@ -108,9 +109,9 @@ def most_of_physics(problem: Problem, record: int) -> float:
 
 
 def most_of_one_cause(problem: Problem, record: int) -> float:
-    """Return by how much the best cause is more probable than none, where large ones are simulated: the linear problem
-    at the nominal model says little of them. Those that come out best at some sizes are linearised again where the
-    linear problem there has them. [nat]
+    """Return the log odds of the best cause against none, where large ones are simulated: the linear problem at the
+    nominal model is inaccurate for them. The best ones at some sizes are linearised again at the optimum of the
+    linear problem there. [nat]
 
     Args:
         problem: of all records as they are, as posed.
@@ -129,7 +130,7 @@ def most_of_one_cause(problem: Problem, record: int) -> float:
 
 
 def _closer_by(problem: Problem, record: int, name: str, now: Evidence) -> Iterator[float]:
-    """Give the log evidence of a cause each time it is linearised where the linear problem before has it."""
+    """Yield the log evidence of a cause each time it is linearised at the optimum of the linear problem before."""
     for _ in range(MAX_ADDED):
         there = _linear(problem, record, np.clip(now.z, *bounds(problem)))
         if not np.isfinite(there.r).all():
@@ -139,7 +140,7 @@ def _closer_by(problem: Problem, record: int, name: str, now: Evidence) -> Itera
 
 
 def _at_sizes(problem: Problem, record: int, here: Linear) -> Iterator[tuple[int, Linear]]:
-    """Give the linear problem of a record at each size of each entry that is simulated, with its cause free."""
+    """Yield the linear problem of a record at each simulated size of each entry, with its cause free."""
     zero, entries = np.zeros(len(problem.entries)), problem.entries
     at = [k for k, entry in enumerate(entries) if entry.record < 0]
     for fit in sizes_run(problem, zero, here.r, at, MERGED_SCALES, [record]):
@@ -149,7 +150,7 @@ def _at_sizes(problem: Problem, record: int, here: Linear) -> Iterator[tuple[int
 
 
 def _with_free(problem: Problem, D: np.ndarray, name: str) -> np.ndarray:
-    """Return prior variances (k,) with a cause as large as causes may be."""
+    """Return prior variances (k,) with the prior variance of a free cause."""
     at = columns_of(problem.entries, (name,))
     D = D.copy()
     D[at] = generous_variances(problem)[at]
@@ -157,8 +158,8 @@ def _with_free(problem: Problem, D: np.ndarray, name: str) -> np.ndarray:
 
 
 def _linear(problem: Problem, record: int, z: np.ndarray | None = None) -> Linear:
-    """Return the linear problem of a record at deviations z (k,), or at the nominal model, with wide tolerances; what
-    does nothing while it is small is moved to a usual size.
+    """Return the linear problem of a record at deviations z (k,), or at the nominal model, with wide tolerances;
+    entries that have no effect while they are small are moved to a usual size.
     """
     z, seen_ = np.zeros(len(problem.entries)) if z is None else z, problem.records[record]
     places = [k for k, entry in enumerate(problem.entries) if entry.record in (-1, record)]
@@ -181,8 +182,8 @@ def _linear(problem: Problem, record: int, z: np.ndarray | None = None) -> Linea
     return Linear(r=r, J=J, D=variances(problem.entries, (), KAPPA_NARROW), own=own, bare=bare)
 
 
-def _begun(problem: Problem, record: int, here: Linear) -> dict[Begun, np.ndarray]:
-    """Return what causes that begin at times of a grid change in the rows of a record (m, parameters)."""
+def _onset_responses(problem: Problem, record: int, here: Linear) -> dict[Begun, np.ndarray]:
+    """Return the responses to causes that begin at onsets of a grid, in the rows of a record (m, parameters)."""
     along = in_rough_steps(BaseRun(problem, np.zeros(len(problem.entries))))
     before = sum(noise.count for each in problem.records[:record] for noise in each.noise.values())
     columns = onset_columns(along, problem.sudden_effects, record)
@@ -190,7 +191,7 @@ def _begun(problem: Problem, record: int, here: Linear) -> dict[Begun, np.ndarra
 
 
 def _causes(problem: Problem, here: Linear, now: Evidence) -> Iterator[Further]:
-    """Give every cause that holds throughout."""
+    """Yield every cause that holds throughout."""
     names, wide = nameable(problem.entries), generous_variances(problem)
     base = Posterior(z=now.z, M=now.M, log_evidence=now.log, log_det=0.0)
     price = float(np.log(PRIOR["single"] / len(names)))
@@ -205,7 +206,7 @@ def _causes(problem: Problem, here: Linear, now: Evidence) -> Iterator[Further]:
 def _onsets(
     problem: Problem, here: Linear, now: Evidence, started: Mapping[Begun, np.ndarray]
 ) -> Iterator[Further]:
-    """Give every cause from every time on."""
+    """Yield every cause with every onset."""
     if not started:
         return
     J, r = here.scaled(now.scales, here.J), here.scaled(now.scales, here.r)

@@ -1,7 +1,7 @@
 """A verdict in words, tables, Markdown, JSON and TOML.
 
-`words` says things in English, `tables` makes rows of them, `summary` answers what one asks first, `sections` puts all
-of it in order, `markdown` writes that as text; `json_file` is the same for programs.
+`words` has sentences in English, `tables` makes rows of them, `summary` answers the first questions of a reader,
+`sections` puts them in order, and its `markdown` writes them as text; `json_file` is the same for programs.
 """
 
 from subzero.diagnosis.report import json_file, tables, words

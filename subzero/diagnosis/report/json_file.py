@@ -26,7 +26,7 @@ def mapping(
 
     Args:
         verdict: of `subzero.diagnose`.
-        records: name → what to say of a record, such as its file and its scenario.
+        records: name → data on a record, such as its file and its scenario.
         scenario: the trial as the user named it, a name or a path, for lines of the shell.
     """
     known = words.sentences(verdict)

@@ -14,9 +14,10 @@ from subzero.diagnosis.results import CAUSE_NAMED, OUTSIDE, UNDECIDED, Gain, Mis
 
 
 class Section(NamedTuple):
-    """A part of a report: paragraphs and tables as they follow one another, and the kinds of figures that belong to it.
+    """A part of a report: paragraphs and tables as they follow one another, and the kinds of figures that belong to
+    it.
 
-    What `is_folded` is for those who want to know how it was found.
+    A section that `is_folded` is for readers who want to know how the verdict was found.
     """
 
     title: str
@@ -26,11 +27,11 @@ class Section(NamedTuple):
 
 
 def sections(verdict: Verdict, records: Mapping[str, str]) -> list[Section]:
-    """Return the sections that have something to say, in the order in which one reads them.
+    """Return the sections that are not empty, in the order of reading.
 
     Args:
         verdict: of `subzero.diagnose`.
-        records: name → what it is, in a line.
+        records: name → description, in a line.
     """
     return [
         Section("What explains the records", _explanations(verdict), ("evidence", "rivals")),
@@ -45,7 +46,7 @@ def sections(verdict: Verdict, records: Mapping[str, str]) -> list[Section]:
 
 
 def belongs(figure: str, section: Section) -> bool:
-    """Say whether a figure stands in a section: by its kind, to which the name of a record may be added."""
+    """Say whether a figure belongs to a section: by its kind, to which the name of a record may be added."""
     return any(figure == kind or figure.startswith(f"{kind}_") for kind in section.figures)
 
 
@@ -54,8 +55,8 @@ def _explanations(verdict: Verdict) -> list[str | tables.Table]:
     if verdict.rivals:
         undecided = verdict.on_model == UNDECIDED
         what = "What the records allow" if undecided else "What else the records allow"
-        beside = "what is most probable" if undecided else "what is told"
-        parts += [f"{what} (D: how far from {beside}):", tables.rivals(verdict)]
+        reference = "what is most probable" if undecided else "what is told"
+        parts += [f"{what} (D: how far from {reference}):", tables.rivals(verdict)]
     return parts
 
 
@@ -118,7 +119,7 @@ def _extended(verdict: Verdict) -> list[str | tables.Table]:
 
 
 def _fitted(verdict: Verdict) -> str:
-    """Return what the model is of a diagnosis that names nothing: how far its numbers were bent for it."""
+    """Return, for a diagnosis that names nothing, how far the numbers of its model deviate from the nominal ones."""
     farthest = max(verdict.deviations, key=lambda name: abs(verdict.deviations[name][0]), default="")
     if not farthest:
         return "the nominal model"
@@ -159,8 +160,8 @@ def markdown(
 
     Args:
         verdict: of `subzero.diagnose`.
-        records: name → what it is, in a line.
-        figures: names of the figures beside it, without their ending.
+        records: name → description, in a line.
+        figures: names of the figures in the same folder, without their ending.
         scenario: the trial as the user named it, a name or a path, for lines of the shell.
     """
     lines = [f"# {words.headline(verdict)}", ""]
@@ -183,7 +184,7 @@ def _paragraphs(texts: Sequence[str]) -> list[str]:
 
 
 def table(table: tables.Table) -> list[str]:
-    """Return a table as Markdown, with an empty line below it."""
+    """Return a table as Markdown, followed by an empty line."""
     rows = [table.header, ("---",) * len(table.header), *table.rows]
     return [
         *(f"| {' | '.join(_escaped(cell) if row != rows[1] else cell for cell in row)} |" for row in rows),

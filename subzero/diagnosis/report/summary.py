@@ -1,7 +1,7 @@
-"""What a reader who was not there asks of a diagnosis, answered in words that need no glossary.
+"""The first questions of a reader of a diagnosis, answered in words that need no glossary.
 
-Five questions: what is wrong, how sure that is, what it costs, what to do next, what would settle it. The terminal, the
-page, ``report.md`` and ``diagnosis.json`` say the same answers; ids and tables stand below.
+Five questions: the fault, its certainty, its cost, the next step, and a trial that would settle it. The terminal, the
+page, ``report.md`` and ``diagnosis.json`` give the same answers; ids and tables follow below.
 """
 
 from __future__ import annotations
@@ -29,7 +29,8 @@ from subzero.diagnosis.results import (
 )
 
 IN_EVERY = 0.9
-"""A cause is known that explanations of this probability share, the same that names one. [-]"""
+"""A cause is known if explanations with this total probability share it; a cause is named from the same one on. [-]
+"""
 
 SURE = {
     0.999: "As sure as records can make one",
@@ -37,13 +38,13 @@ SURE = {
     0.8: "Fairly sure",
     0.5: "More likely than not",
 }
-"""Probability from which on → how one says it."""
+"""Least probability → words for it."""
 WITHIN_NOISE = 1.2
-"""A root mean square error of so many noise levels is what the noise alone may leave. [-]"""
+"""Largest root mean square error, in noise levels, that the noise alone may leave. [-]"""
 MOST_CHANNELS, MOST_EXPLANATIONS = 2, 4
-"""So many channels, and explanations, are told in a sentence."""
+"""Most channels, and most explanations, in a sentence."""
 MOST_HIDDEN = 5
-"""So many causes that could not have been seen are named."""
+"""Most undetectable causes that are named."""
 
 LOOK_AT = {
     "propulsion": "the propeller, its motor and the battery",
@@ -56,11 +57,11 @@ LOOK_AT = {
     "clock": "the clocks of the commands and of the sensors",
     "start": "how the trial began",
 }
-"""Where a cause of the catalogue acts → what to look at."""
+"""Slot of a cause → things to inspect."""
 
 
 class Answer(NamedTuple):
-    """A question, sentences that answer it, and perhaps a line of the shell that acts on it."""
+    """A question, sentences that answer it, and a line of the shell that acts on it, if there is one."""
 
     question: str
     words: tuple[str, ...]
@@ -70,7 +71,7 @@ class Answer(NamedTuple):
 def summary(
     verdict: Verdict, scenario: str = "SCENARIO", extended: str = "extended.toml"
 ) -> tuple[Answer, ...]:
-    """Return the answers to what everybody asks.
+    """Return the answers to the first questions of a reader.
 
     Args:
         verdict: of `subzero.diagnose`.
@@ -87,7 +88,7 @@ def summary(
 
 
 def _command(verdict: Verdict, scenario: str, extended: str) -> str:
-    """Return the line of the shell that does what is to be done next, "" if there is none."""
+    """Return the line of the shell for the next step, "" if there is none."""
     scenario = shlex.quote(scenario)
     if verdict.on_model in (CALIBRATED, NOTHING_NEAR):
         return f"subzero calibrate RECORDS --scenario {scenario} --out my_vehicle.toml"
@@ -102,7 +103,7 @@ def _is_new(verdict: Verdict) -> bool:
 
 
 def _wrong(verdict: Verdict) -> Iterator[str]:
-    """Give what is wrong: errors in the data first, then the model on records without them."""
+    """Yield the faults: errors in the data first, then those of the model on records without them."""
     if verdict.then or verdict.verdict == UNDECIDED:
         yield from (words.data_error(error) for error in verdict.data_errors)
     if verdict.then:
@@ -118,7 +119,7 @@ def _wrong(verdict: Verdict) -> Iterator[str]:
 
 
 def _in_every_explanation(verdict: Verdict) -> Iterator[str]:
-    """Give the causes that hardly any probable explanation lacks: they are known, however undecided the rest is."""
+    """Yield the causes that hardly any probable explanation lacks: they are known, however undecided the rest is."""
     parts = {
         name: without.split(" + ")
         for name in verdict.probabilities
@@ -135,7 +136,7 @@ def _in_every_explanation(verdict: Verdict) -> Iterator[str]:
 
 
 def _sure(verdict: Verdict) -> Iterator[str]:
-    """Give how probable it is, what comes next, and whether these records can tell the two apart."""
+    """Yield the probability of the verdict, the runner-up, and whether these records can tell the two apart."""
     probability = _probability(verdict)
     for error in verdict.data_errors if verdict.then else ():
         yield f"That {error.sentence}: {_in_words(error.probability).lower()}."
@@ -161,7 +162,7 @@ def _sure(verdict: Verdict) -> Iterator[str]:
 
 
 def _probability(verdict: Verdict) -> float | None:
-    """Return the probability of what is told; of several causes that of the least sure one; None if it is not known."""
+    """Return the probability of the reported explanation; of several causes the lowest; None if it is not known."""
     if verdict.on_model == CAUSE_NAMED and verdict.causes:
         return min(cause.probability for cause in verdict.causes)
     if verdict.on_model in (OUTSIDE, NOTHING_WRONG):
@@ -171,12 +172,12 @@ def _probability(verdict: Verdict) -> float | None:
 
 
 def _in_words(probability: float) -> str:
-    """Return how sure a probability makes one."""
+    """Return a probability in words."""
     return next((said for least, said in SURE.items() if probability >= least), "Not sure")
 
 
 def _undetectable(verdict: Verdict) -> Iterator[str]:
-    """Give what these records could not have shown, which "nothing is wrong" says nothing of."""
+    """Yield the undetectable causes, on which "nothing is wrong" makes no statement."""
     rows = verdict.detectable
     hidden = [words.explanation(row.id) for row in rows if row.signal < SEEN_SIGNAL]
     if not rows:
@@ -191,7 +192,7 @@ def _undetectable(verdict: Verdict) -> Iterator[str]:
 
 
 def _runner_up(verdict: Verdict) -> Iterator[str]:
-    """Give what is most probable beside what is told, and how far it is where that is known."""
+    """Yield the most probable explanation after the reported one, and its distance where that is known."""
     others = [name for name in verdict.probabilities if not words.is_reported(name, verdict)]
     if not others:
         return
@@ -206,7 +207,7 @@ def _runner_up(verdict: Verdict) -> Iterator[str]:
 
 
 def _apart(D: float) -> str:
-    """Return whether these records can tell two explanations apart; nothing where that is not known."""
+    """Return whether these records can tell two explanations apart; "" where that is not known."""
     if not math.isfinite(D):
         return ""
     apart = (
@@ -220,7 +221,7 @@ def _apart(D: float) -> str:
 
 
 def _costs(verdict: Verdict) -> Iterator[str]:
-    """Give by how much the simulation is wrong, on data that were not fitted if there are such, and what is gained."""
+    """Yield the error of the simulation, on data that were not fitted if there are such, and the gain."""
     if verdict.gain is not None and (verdict.gain.held_out or verdict.gain.fitted):
         yield from _gained(verdict)
         return
@@ -243,7 +244,7 @@ def _costs(verdict: Verdict) -> Iterator[str]:
 
 
 def _best_misses(verdict: Verdict, worst: list[tuple[str, str]]) -> Iterator[str]:
-    """Give what is left of these errors where nothing is extended: of the calibrated or the most probable model."""
+    """Yield the remaining errors where the model is not extended: of the calibrated or the most probable model."""
     first = max(verdict.probabilities, key=lambda name: verdict.probabilities[name], default="none")
     known = {
         f"rival: {first}": "the most probable explanation",
@@ -258,7 +259,7 @@ def _best_misses(verdict: Verdict, worst: list[tuple[str, str]]) -> Iterator[str
 
 
 def _left(verdict: Verdict, record: str, channel: str, model: str) -> float:
-    """Return the root mean square of what a model leaves of the samples that were used; NaN if that is not known."""
+    """Return the root mean square residual of a model at the used samples; NaN if that is not known."""
     curves = verdict.curves.get(record)
     if curves is None or model not in curves.models or channel not in curves.measured:
         return math.nan
@@ -268,7 +269,7 @@ def _left(verdict: Verdict, record: str, channel: str, model: str) -> float:
 
 
 def _gained(verdict: Verdict) -> Iterator[str]:
-    """Give the error before and after; a gain that is none is called that."""
+    """Yield the error before and after; a gain of zero is stated as such."""
     gain = verdict.gain
     if gain is None:
         return
@@ -300,7 +301,7 @@ def _times(levels: float) -> str:
 
 
 def _next(verdict: Verdict) -> Iterator[str]:
-    """Give what to do with the records, the vehicle and the model."""
+    """Yield the next steps with the records, the vehicle and the model."""
     yield from (f"In {error.record}: {error.remedy}." for error in verdict.data_errors if verdict.then)
     if verdict.on_model == CAUSE_NAMED:
         places = list(dict.fromkeys(filter(None, (_place(cause.id) for cause in verdict.causes))))
@@ -338,7 +339,7 @@ def _place(cause: str) -> str:
 
 
 def _settles(verdict: Verdict) -> Iterator[str]:
-    """Give which trial or channel would decide what is open."""
+    """Yield the trial or channel that would decide the open questions."""
     if verdict.next_trial is not None:
         yield words.next_trial(verdict.next_trial)
     elif verdict.on_model == OUTSIDE:

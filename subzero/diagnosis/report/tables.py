@@ -18,17 +18,17 @@ from subzero.diagnosis.report.words import (
 from subzero.diagnosis.results import UNDECIDED, Detectability, Misfit, NextTrial, Rival, Verdict
 
 CONFUSED_BELOW, CLEAR_FROM = 9.0, 16.0
-"""Discrimination D below which two causes cannot be told apart, and above which they can."""
+"""Discrimination D below which two causes cannot be distinguished, and above which they can."""
 
 SEEN_SIGNAL = 4.0
-"""Signal, in noise and tolerances, that is seen."""
+"""Least detectable signal, in noise and tolerances."""
 
 
 MOST_RIVALS, WORTH_A_LINE = 5, 0.01
-"""So many are shown where space is short, and none that is less probable."""
+"""Most rivals where space is short, and least probability of one."""
 
 INVISIBLE = 0.01
-"""Signal below which no size that makes sense would be seen."""
+"""Signal below which no possible size would be detectable."""
 
 
 class Table(NamedTuple):
@@ -39,7 +39,7 @@ class Table(NamedTuple):
 
 
 def detectable(verdict: Verdict | Sequence[Detectability], *, every: bool = False) -> Table:
-    """Return what the records could show: causes that would be missed or mixed up, or all of them."""
+    """Return the detectability of causes: of those that would be missed or mixed up, or of all."""
     rows = verdict.detectable if isinstance(verdict, Verdict) else verdict
     known = sentences(verdict) if isinstance(verdict, Verdict) else {}
     shown = [row for row in rows if every or row.signal < SEEN_SIGNAL or row.discrimination < CLEAR_FROM]
@@ -63,7 +63,7 @@ def detectable(verdict: Verdict | Sequence[Detectability], *, every: bool = Fals
 
 
 def _smallest(detectability: Detectability) -> str:
-    """Return the smallest deviations that are seen, with their units; of a share there is none."""
+    """Return the smallest detectable deviations, with their units; a share has none."""
     if detectability.signal < INVISIBLE:
         return NOTHING
     units = {name: "" if unit == "1" else f" {unit}" for name, unit in detectability.units.items()}
@@ -104,7 +104,7 @@ def misfit(rows: Mapping[str, Misfit]) -> Table:
 
 
 def _follows(misfit: Misfit) -> str:
-    """Return the command that the residual follows most, and how late."""
+    """Return the command that the residual follows most, and the lag."""
     if not misfit.command_correlation:
         return NOTHING
     name, (lag, r) = max(misfit.command_correlation.items(), key=lambda item: abs(item[1][1]))
@@ -116,7 +116,9 @@ def _when(misfit: Misfit) -> str:
 
 
 def rivals(verdict: Verdict, *, short: bool = False) -> Table:
-    """Return what else explains the records, and how far it is from what is told; `short` without parameters."""
+    """Return the other explanations of the records, and their distance from the reported one; `short` without
+    parameters.
+    """
     if short:
         rows = [_short(each) for each in _worth(verdict.rivals)]
         words = (
@@ -148,7 +150,7 @@ def _worth(found: Sequence[Rival]) -> Sequence[Rival]:
 
 
 def rival_in_words(rival: Rival) -> str:
-    """Return a rival in words; a force or a drift as everybody understands it."""
+    """Return a rival in words; a force or a drift in everyday words."""
     return explanation(_id(rival), {_id(rival): rival.sentence} if ":" not in _id(rival) else {})
 
 
@@ -163,7 +165,7 @@ def _numbers(rival: Rival) -> str:
 
 
 def next_trial(trial: NextTrial) -> Table | None:
-    """Return the commands of a trial that is not in any file; None without them."""
+    """Return the commands of a trial that is in no file; None without them."""
     if not trial.commands:
         return None
     header = (
@@ -187,12 +189,12 @@ GAINS = {
     "rival": "best rival",
     "floor": "noise floor",
 }
-"""Errors of a channel → what they are called in a table; "calibrated" has no new physics."""
+"""Errors of a channel → their names in a table; "calibrated" has no new physics."""
 
 
 def gain(verdict: Verdict, *, short: bool = False) -> dict[str, Table]:
-    """Return error before and after, beside the noise: on held-out and on fitted data; `short` for a terminal: of the
-    former, if there are such, without the calibrated model.
+    """Return the errors before and after, with the noise: on held-out and on fitted data; `short` for a terminal:
+    only on held-out data, if there are such, without the calibrated model.
     """
     if verdict.gain is None:
         return {}

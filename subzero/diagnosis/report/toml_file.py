@@ -1,4 +1,4 @@
-"""An extended model as a TOML file that anyone can run, written, and read with all its faults told.
+"""An extended model as a TOML file that anyone can run: written, and read with all its problems reported.
 
     scenario = "fig6"
 
@@ -19,9 +19,9 @@
     feature = "u|u|"
     coefficient = -1.2              # N s2/m2
 
-Numbers are deviations from the nominal model, with their unit in the key: ``subzero simulate fig6 --with FILE``. It may
-name the Python file that its effects came from. That file is never run from here, for reading data must not run code:
-whoever trusts it says so on the command line (``--effects FILE``).
+Numbers are deviations from the nominal model, with their unit in the key: ``subzero simulate fig6 --with FILE``. It
+may name the Python file that its effects came from. That file is never run from here, as reading data must not run
+code: a user who trusts it says so on the command line (``--effects FILE``).
 """
 
 from __future__ import annotations
@@ -50,14 +50,14 @@ from subzero.errors import short as shown
 from subzero.external_force import AXES, FEATURES, MissingForce, Term
 
 STARTS = "starts_at_s"
-"""Key of when a cause began in mid-trial."""
+"""Key of the onset of a cause that began in mid-trial."""
 DIGITS = 8
-"""Significant ones in the file."""
+"""Significant digits in the file."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ExtendedFile:
-    """What an extended.toml says.
+    """The contents of an extended.toml.
 
     Attributes:
         extended: the deviations.
@@ -95,9 +95,9 @@ def text_of(
     Args:
         extended: the deviations.
         setting: the nominal one, for the comments.
-        effects: by id, all that are named; ours if None.
+        effects: by id, all that are named; those of the catalogue if None.
         effects_file: Python file of the user's own effects, if there are any.
-        source: what it was found from.
+        source: records that it was found from.
     """
     known = effects or all_effects()
     own = f" --effects {shlex.quote(printable(str(effects_file)))}" if effects_file else ""
@@ -149,7 +149,7 @@ def _list(values: Iterable[float]) -> str:
 
 
 def _number(value: float) -> str:
-    """Return a number that TOML reads as a float, in more digits than any of them is good for."""
+    """Return a number that TOML reads as a float, in more digits than are significant."""
     return repr(float(f"{value:.{DIGITS}g}"))
 
 
@@ -166,10 +166,12 @@ KEYS = ("scenario", "source", "effects_file", "effects", "calibration", "missing
 
 
 LARGEST = 1e9
-"""No deviation, time [s], force [N] or coefficient is larger; sums and squares of such numbers stay finite."""
+"""No deviation, time [s], force [N] or coefficient is larger; sums and squares of such numbers remain finite."""
 
 MOST_PARTS = 100
-"""So many forces are read of one kind: a dozen for each axis and more; each costs in every step of a run."""
+"""Most forces of one kind that are read: a dozen for each axis and more; each costs time in every step of a
+simulation.
+"""
 
 
 @checked_arguments
@@ -229,7 +231,7 @@ def _effects(
     starts: dict[str, float] | None,
     problems: list[str],
 ) -> dict[str, dict[str, float]]:
-    """Return id → parameter → deviation of a section; what is wrong becomes a problem."""
+    """Return id → parameter → deviation of a section; errors are added to `problems`."""
     table = source.table.get(section, {})
     if not isinstance(table, Mapping):
         problems.append(f"{_at(source, section)}: this is not a section; write [{section}.rudder_lag]")
@@ -250,14 +252,16 @@ def _effects(
 
 
 def _todays_id(name: str) -> str:
-    """Return the id of an effect by today's name of its channel: ``sensor_bias:roll`` is now ``…:roll_angle``."""
+    """Return the id of an effect with the present name of its channel: ``sensor_bias:roll`` is now
+    ``…:roll_angle``.
+    """
     effect, at, time = name.partition("@")
     kind, colon, channel = effect.partition(":")
     return f"{kind}{colon}{RENAMED_CHANNELS.get(channel, channel)}{at}{time}"
 
 
 def _of_whom(source: Source) -> str:
-    """Return where an effect that is in no catalogue may be, as far as the file says it."""
+    """Return the origin of an effect that is in no catalogue, as far as the file states it."""
     own = source.table.get("effects_file")
     if not own:
         return ""
@@ -274,7 +278,7 @@ def _numbers(
     starts: dict[str, float],
     problems: list[str],
 ) -> dict[str, float]:
-    """Return parameter → deviation of one effect, and note when it starts."""
+    """Return parameter → deviation of one effect, and note its onset."""
     parameters = {key_of(parameter): parameter for parameter in effect.parameters}
     found: dict[str, float] = {}
     for key, value in numbers.items():
@@ -326,7 +330,7 @@ def _missing(source: Source, problems: list[str]) -> MissingForce | None:
 
 
 def _together(histories: list[MissingForce]) -> list[MissingForce]:
-    """Return histories with those at the same times added, so that they stay exactly what they are."""
+    """Return histories with those at the same times added, which leaves their sum unchanged."""
     sums: dict[tuple[float, ...], np.ndarray] = {}
     for history in histories:
         sums[history.time] = sums.get(history.time, 0.0) + np.array(history.wrench)

@@ -43,7 +43,7 @@ HEADLINES = {
 
 NOTHING = "–"
 FORCE, DRIFT = "unknown_force:", "sensor_drift:"
-"""How ids of what is outside the catalogue begin."""
+"""Prefixes of the ids of explanations out of the catalogue."""
 
 PUSHES = {
     "X": ("pushes the hull forward", "holds the hull back", "pushes the hull forward and back"),
@@ -53,14 +53,14 @@ PUSHES = {
     "M": ("raises the nose", "lowers the nose", "pitches the hull up and down"),
     "N": ("turns the hull to starboard", "turns the hull to port", "turns the hull from side to side"),
 }
-"""Axis of a force or a moment → what it does where it is positive, where it is negative, and where it is both."""
+"""Axis of a force or a moment → its effect where it is positive, where it is negative, and where it is both."""
 ONE_SIDED = 0.25
-"""A force of one sign is never as large with the other one, as a share."""
+"""A force counts as one of one sign if it is never as large with the other one, as a share."""
 
 UNCHANGED = "No file was changed. All that follows is said of the records as they are once that is put right."
 
 ALTERNATIVE_PROBABILITY = 0.1
-"""A feature that is as probable in a formula, and not in the one that is told, is told too."""
+"""A feature that is at least as probable, and not in the reported formula, is reported too."""
 
 
 def number(value: float, unit: str = "") -> str:
@@ -73,7 +73,7 @@ def number(value: float, unit: str = "") -> str:
 
 
 def estimate(name: str, estimate: Estimate) -> str:
-    """Return a parameter in words: value, interval, what the model has."""
+    """Return a parameter in words: value, interval, value of the model."""
     value, low, high = (number(x, estimate.unit) for x in (estimate.value, estimate.low, estimate.high))
     return f"{name.replace('_', ' ')} {value} (95 %: {low} to {high}; model: {number(estimate.nominal, estimate.unit)})"
 
@@ -87,13 +87,13 @@ def cause(cause: Cause) -> str:
 
 
 def cause_in_short(cause: Cause) -> str:
-    """Return a cause in words, with its value beside that of the model."""
+    """Return a cause in words, with its value compared with that of the model."""
     numbers = "; ".join(_against_model(name, parameter) for name, parameter in cause.parameters.items())
     return f"{_capital(cause.sentence)}{_since(cause)}{': ' if numbers else ''}{numbers}."
 
 
 def _against_model(name: str, estimate: Estimate) -> str:
-    """Return a parameter beside that of the model; a share as what is more or less than there."""
+    """Return a parameter compared with that of the model; a share as an excess or a deficit."""
     if name == "share" and estimate.unit == "1" and estimate.nominal == 0.0:
         return f"{100.0 * abs(estimate.value):.3g} % {'more' if estimate.value > 0.0 else 'less'} than in the model"
     value, nominal = number(estimate.value, estimate.unit), number(estimate.nominal, estimate.unit)
@@ -109,7 +109,7 @@ def _since(cause: Cause) -> str:
 
 
 def something(axis: str, force: np.ndarray | None = None) -> str:
-    """Return what a force or a moment that nobody explains does, such as "something rolls the hull to port"."""
+    """Return the effect of a latent force or moment, such as "something rolls the hull to port"."""
     forward, back, both = PUSHES[axis]
     if force is None:
         return f"something {both}"
@@ -124,19 +124,19 @@ def explanation(name: str, known: Mapping[str, str] | None = None) -> str:
 
     Args:
         name: as in `Verdict.probabilities`: "none", "rudder_lag", "a + b", "hull_drag@12.5", "unknown_force:X".
-        known: id → sentence of causes that the catalogue does not have.
+        known: id → sentence of causes that are not in the catalogue.
     """
     return " and ".join(_explained(each, known or {}) for each in name.split(" + "))
 
 
 def without_errors(name: str, verdict: Verdict) -> str:
-    """Return a hypothesis without the errors in the data that are told."""
+    """Return a hypothesis without the reported errors in the data."""
     reported = {error.id for error in verdict.data_errors} if verdict.then else set()
     return " + ".join(each for each in name.split(" + ") if each not in reported) or "none"
 
 
 def with_errors(name: str, verdict: Verdict) -> str:
-    """Return a hypothesis in words, without the errors in the data that are told."""
+    """Return a hypothesis in words, without the reported errors in the data."""
     rest = without_errors(name, verdict)
     if rest == "none" and name != "none":
         return "nothing else is wrong"
@@ -168,7 +168,7 @@ def _spaced(name: str) -> str:
 
 
 def sentences(verdict: Verdict) -> dict[str, str]:
-    """Return what a verdict itself says of its causes and rivals: hypothesis → sentence."""
+    """Return the verdict's own descriptions of its causes and rivals: hypothesis → sentence."""
     reported = {" + ".join(rival.ids) or "none": rival.sentence for rival in verdict.rivals}
     reported = {name: said for name, said in reported.items() if not name.startswith(FORCE)}
     reported |= {each.id: each.sentence for each in verdict.causes if each.start_time is None}
@@ -179,7 +179,7 @@ def sentences(verdict: Verdict) -> dict[str, str]:
 
 
 def probability(value: float) -> str:
-    """Return a probability, without a promise that nothing else is possible."""
+    """Return a probability in words, never as a certainty."""
     return "> 0.999" if value > 0.999 else "< 0.001" if value < 0.001 else f"{value:.3f}"
 
 
@@ -196,7 +196,7 @@ def headline(verdict: Verdict) -> str:
 
 
 def is_reported(name: str, verdict: Verdict) -> bool:
-    """Say whether a hypothesis is what the verdict tells: its causes, whenever they began, or its force or drift."""
+    """Say whether a hypothesis is the reported one: its causes, whatever their onsets, or its force or drift."""
     parts = [error for error in without_errors(name, verdict).split(" + ") if error != "none"]
     if verdict.on_model == UNDECIDED:
         return False
@@ -208,7 +208,7 @@ def is_reported(name: str, verdict: Verdict) -> bool:
 
 
 def title(verdict: Verdict) -> str:
-    """Return what stands above a page: what was found where it has a name, else the headline."""
+    """Return the title of a page: the explanation where one is named, else the headline."""
     if verdict.data_errors and verdict.then:
         return headline(verdict)
     if verdict.on_model == CAUSE_NAMED and verdict.causes:
@@ -219,21 +219,21 @@ def title(verdict: Verdict) -> str:
 
 
 def data_error(error: FoundError) -> str:
-    """Return an error in the data in words: where, what, what to change, and what else it may be."""
+    """Return an error in the data in words: place, description, remedy, and alternatives."""
     alike = "".join(f" Or, which these records cannot tell from it: {other}." for other in error.alike)
     what = f"{error.sentence}: {error.remedy}. Probability {probability(error.probability)}."
     return f"{error.record}: {what}{alike}"
 
 
 def sentence(verdict: Verdict) -> str:
-    """Return the verdict in a sentence without ids; errors in the data stand before what is said of the model."""
+    """Return the verdict in a sentence without ids; errors in the data come before the verdict on the model."""
     if not verdict.then:
         return on_model(verdict)
     return " ".join([*map(data_error, verdict.data_errors), "Without that:", on_model(verdict)])
 
 
 def on_model(verdict: Verdict) -> str:
-    """Return the verdict on the model; of what cannot be told apart, no more than one can read."""
+    """Return the verdict on the model; of indistinguishable explanations only the first few."""
     if verdict.on_model == UNDECIDED:
         return _undecided(verdict)
     if verdict.on_model == OUTSIDE and verdict.unknown is not None:
@@ -254,7 +254,7 @@ def on_model(verdict: Verdict) -> str:
 
 
 def _within(verdict: Verdict) -> str:
-    """Return what the most probable hypothesis has, if it is a cause that is no larger than calibration may make it."""
+    """Return the cause of the most probable hypothesis in words, if it is no larger than calibration allows."""
     first = max(verdict.probabilities, key=lambda name: verdict.probabilities[name], default="none")
     first = without_errors(first, verdict)
     if first == "none":
@@ -265,7 +265,7 @@ def _within(verdict: Verdict) -> str:
 
 
 def _undecided(verdict: Verdict) -> str:
-    """Return what the records allow, the most probable first."""
+    """Return the explanations that the records allow, the most probable first."""
     known, chances = sentences(verdict), verdict.probabilities
     shown = "; ".join(
         f"{explanation(name, known)} ({probability(chances[name])})" for name in worth_naming(chances)
@@ -276,7 +276,7 @@ def _undecided(verdict: Verdict) -> str:
 
 
 def unknown(unknown: Unknown) -> str:
-    """Return what is outside the catalogue in words: what it does, its size, its formula; or the drift of a sensor."""
+    """Return a latent force in words: its effect, its size, its formula; or the drift of a sensor."""
     most = max(range(len(unknown.force)), key=lambda at: abs(unknown.force[at]))
     size = (
         f"{unknown.force[most]:.3g} ± {1.96 * unknown.band[most]:.2g} {unknown.unit} "
@@ -294,7 +294,7 @@ def unknown(unknown: Unknown) -> str:
 
 
 def _other_features(unknown: Unknown) -> str:
-    """Return what may be in the formula instead, in words; empty if nothing is as probable as that."""
+    """Return the features that may be in the formula instead, in words; "" if none is probable enough."""
     reported = {feature for _, feature, *_ in unknown.formula}
     others = [
         f"{name} ({_described(name)}; probability {p:.2f})"
@@ -320,7 +320,7 @@ def formula_term(term: tuple[str, str, float, float, float]) -> str:
 
 
 def next_trial(trial: NextTrial) -> str:
-    """Return what to do next."""
+    """Return the recommended next trial in words."""
     adds = f" Log {column(trial.channel)} too." if trial.channel else ""
     sentence = trial.sentence.rstrip(".")
     return f"Next trial: {sentence} ({trial.name}); it decides with probability {trial.decides:.2f}.{adds}"

@@ -1,9 +1,9 @@
-"""From findings to the verdict: what is decided, what is named, its rivals, and words; a pure function of findings.
+"""From findings to the verdict: the decision, named causes, rivals, and words; a pure function of findings.
 
     findings, distances → decision → follow-up (simulations, `follow_up`) → verdict
 
-Beside the named explanation stand the remaining models: hypotheses and change points that the records allow, each with
-its distance D. No simulation and no fit is made here.
+The named explanation is reported with the remaining models: hypotheses and change points that the records allow, each
+with its distance D. No simulation and no fit is made here.
 """
 
 from __future__ import annotations
@@ -67,11 +67,11 @@ LISTED_PROBABILITY = 1e-4
 
 
 USUAL_NOISE_RATIO = (0.6, 1.6)
-"""Noise of a usual sensor, over its specification."""
+"""Range of the noise of a usual sensor, over its specification."""
 
 
 class ClosestRival(NamedTuple):
-    """What comes closest to an explanation: the squared distance D to it, and which it is; () for the tolerances."""
+    """The closest rival of an explanation: the squared distance D to it, and its causes; () for the tolerances."""
 
     discrimination: float = 0.0
     ids: Ids = ()
@@ -79,11 +79,11 @@ class ClosestRival(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Ranked:
-    """All explanations by their probability, and what comes closest to the first of each kind.
+    """All explanations by their probability, and the closest rival of the first of each kind.
 
     Attributes:
-        inside: hypothesis → probability; with those outside the catalogue they sum to 1.
-        outside: a latent force, a drift or a change point, last, with the causes beside it → probability.
+        inside: hypothesis → probability; with those of explanations out of the catalogue they sum to 1.
+        outside: a latent force, a drift or a change point, last, with the causes that it is added to → probability.
         best: the most probable hypothesis that has a fit.
         close_to_best: the closest rival of its causes of a practical size.
         change_points: those with a fit of their own, the most probable first.
@@ -104,7 +104,7 @@ class Ranked:
 
     @property
     def change_point(self) -> ChangePointSummary:
-        """The most probable change point, in short."""
+        """A summary of the most probable change point."""
         if not self.change_points:
             return ChangePointSummary()
         first = self.change_points[0]
@@ -114,8 +114,8 @@ class Ranked:
 
 
 def is_large(fitted: FittedChangePoint) -> bool:
-    """Say whether a sudden cause is of a practical size; calibration changes nothing in the middle of a trial, so that
-    half of what calibration may do is enough.
+    """Say whether a change point is of a practical size; calibration does not change in mid-trial, so that half the
+    tolerance of calibration is enough.
     """
     sizes = zip(fitted.change_point.mean, fitted.change_point.effect.parameters, strict=True)
     return any(
@@ -125,8 +125,8 @@ def is_large(fitted: FittedChangePoint) -> bool:
 
 
 class RemainingModels(NamedTuple):
-    """What the records leave: hypotheses, change points, latent forces and drifts with the causes beside them; and the
-    smallest set of explanations that is probable enough.
+    """The explanations that the records allow: hypotheses, change points, latent forces and drifts with the causes
+    that they are added to; and the credible set, the smallest one that is probable enough.
     """
 
     hypotheses: list[Ids]
@@ -137,15 +137,15 @@ class RemainingModels(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FollowUp:
-    """What only simulations could tell after the search, made for one verdict.
+    """Results that need simulations after the search, made for one verdict.
 
     Attributes:
         verdict: it was made for.
-        remaining: what the records leave.
-        extension: what the verdict adds to the model.
-        rivals: of what is told, the most probable first.
-        gain: what the extended model explains of held-out data.
-        next_trial: what to do next.
+        remaining: the explanations that the records allow.
+        extension: the verdict's additions to the model.
+        rivals: of the reported explanation, the most probable first.
+        gain: of the extended model on held-out data.
+        next_trial: recommended next trial.
         curves: record → curves of all models that are drawn.
     """
 
@@ -159,13 +159,13 @@ class FollowUp:
 
 
 def decided(findings: Findings, ranked: Ranked) -> str:
-    """Return the verdict that probabilities, sizes and distances make."""
+    """Return the verdict that follows from probabilities, sizes and distances."""
     forces = sum(p for ids, p in ranked.outside.items() if "@" not in ids[-1])
     is_practical = bool(practical_of(findings, ranked.best))
     apart = ranked.close_to_best.discrimination
     verdict = decide(ranked.inside, forces, is_practical, apart, ranked.change_point)
     if verdict == OUTSIDE and findings.sensitive:
-        verdict = UNDECIDED  # an error of a run that grows is a force to those who do not know better
+        verdict = UNDECIDED  # a growing error of a simulation looks like a force
     entries, z, named, kappa = _explanation(findings, ranked, verdict)
     names_something = verdict in (CAUSE_NAMED, OUTSIDE)
     if not is_near(entries, z, named) or (names_something and kappa == max(KAPPAS)):
@@ -176,7 +176,7 @@ def decided(findings: Findings, ranked: Ranked) -> str:
 def _explanation(
     findings: Findings, ranked: Ranked, verdict: str
 ) -> tuple[Sequence[Entry], np.ndarray, Ids, float]:
-    """Return the numbers of the explanation that a verdict is about, their deviations (k,), the causes it names, and
+    """Return the entries of the explanation that a verdict is about, their deviations (k,), the causes it names, and
     the scale κ of the tolerances under which it is most probable.
     """
     best, entries = ranked.best, findings.problem.entries
@@ -185,14 +185,14 @@ def _explanation(
         first = ranked.change_points[0]
         change = first.change_point
         return first.problem.entries, first.fit.z, (change.effect.id,), change.kappa
-    strange = max(findings.out_of_catalogue, key=lambda each: each.log_posterior, default=None)
-    if strange and strange.point and strange.log_posterior > best.log_posterior:
-        return entries, strange.point.fit.z, best.ids, kappa
+    added = max(findings.out_of_catalogue, key=lambda each: each.log_posterior, default=None)
+    if added and added.point and added.log_posterior > best.log_posterior:
+        return entries, added.point.fit.z, best.ids, kappa
     return entries, best.fit.z, best.ids, kappa
 
 
 def remaining_models(ranked: Ranked) -> RemainingModels:
-    """Return what the records leave, of the smallest set of explanations that is probable enough."""
+    """Return the explanations that the records allow, from the credible set."""
     credible = credible_set(ranked.probabilities)
     return RemainingModels(
         hypotheses=[ids for ids in credible if ids in ranked.inside],
@@ -205,7 +205,9 @@ def remaining_models(ranked: Ranked) -> RemainingModels:
 def rivals_of(
     findings: Findings, ranked: Ranked, verdict: str, remaining: RemainingModels, new: Extension
 ) -> tuple[Rival, ...]:
-    """Return the rivals of what is told, the most probable first; where nothing is told, all that is left."""
+    """Return the rivals of the reported explanation, the most probable first; where none is reported, all that
+    remain.
+    """
     is_undecided, best = verdict == UNDECIDED, ranked.best
     found = rivals(findings, best, ranked.inside, remaining.hypotheses, None if is_undecided else best.ids)
     if new.cause:
@@ -222,7 +224,7 @@ def rivals_of(
 
 
 def conclude(findings: Findings, ranked: Ranked, follow_up: FollowUp) -> Verdict:
-    """Return the verdict of finished (or interrupted) work."""
+    """Return the verdict of a finished (or interrupted) search."""
     new, best, verdict = follow_up.extension, ranked.best, follow_up.verdict
     named = _named(findings, ranked, verdict, new)
     left = names_of(follow_up.remaining.credible, follow_up.rivals)
@@ -266,7 +268,7 @@ def _listed(probabilities: Mapping[Ids, float]) -> dict[str, float]:
 
 
 def _notes(work: Findings, best: Candidate, inside: float) -> tuple[str, ...]:
-    """Return what else a reader should know; of the tolerances, if what holds throughout is probable."""
+    """Return further remarks for a reader; on the tolerances, if causes that hold throughout are probable."""
     found, scale = [], tolerance_scale(work.search.candidates.values())
     wide = max(scale, key=lambda kappa: scale[kappa])
     if wide > 1.0 and inside > HEALTHY_PROBABILITY:

@@ -1,8 +1,9 @@
-"""What a verdict says of an explanation: estimates with intervals, named causes, rivals, and the extended model.
+"""The parts of a verdict on an explanation: estimates with intervals, named causes, rivals, and the extended model.
 
-An interval is ±1.96 standard deviations of the posterior, mixed over κ. The extended model is the nominal one with the
-named causes, a latent force, or a cause from its onset on; all other deviations that the fit found within tolerance are
-its calibration. A latent force is fitted here, by simulations; everything else is taken from fits that are there.
+An interval is ±1.96 standard deviations of the posterior, mixed over κ. The extended model is the nominal one with
+the named causes, a latent force, or a cause from its onset on; all other deviations that the fit found within
+tolerance are its calibration. A latent force is fitted here, by simulations; everything else is taken from existing
+fits.
 """
 
 from __future__ import annotations
@@ -96,17 +97,17 @@ def estimates(work: Findings, candidate: Candidate, name: str) -> dict[str, Esti
 
 
 def sentence_of(problem: Problem, name: str) -> str:
-    """Return what a cause is, in words."""
+    """Return the description of a cause, in words."""
     return next(entry.effect.sentence for entry in problem.entries if entry.effect.id == name)
 
 
 def practical_of(work: Findings, candidate: Candidate) -> Ids:
-    """Return those causes of a candidate that are of a practical size."""
+    """Return the causes of a candidate that are of a practical size."""
     return practical_causes(work.problem.entries, candidate.ids, candidate.fit.z, candidate.kappa)
 
 
 def causes(work: Findings, best: Candidate, inside: Mapping[Ids, float], ids: Ids) -> tuple[Cause, ...]:
-    """Return the named causes of a candidate, each with the probability that it is among those of the truth."""
+    """Return the named causes of a candidate, each with the probability that it is among the true ones."""
     found = []
     for cause_id in ids:
         p = sum(share for ids, share in inside.items() if cause_id in ids)
@@ -122,7 +123,7 @@ def causes(work: Findings, best: Candidate, inside: Mapping[Ids, float], ids: Id
 
 
 def cause_of(work: Findings, what: FittedChangePoint, probability: float) -> Cause:
-    """Return a sudden cause in words and numbers."""
+    """Return a cause with a change point in words and numbers."""
     fit, effect, n = what.fit, what.change_point.effect, len(work.problem.entries)
     sd = np.sqrt(np.diag(posterior(fit.quadratic, fit.D).M))
     setting = what.problem.records[what.change_point.record].setting
@@ -148,8 +149,8 @@ def rivals(
     reported: Ids | None,
     most: int = 8,
 ) -> tuple[Rival, ...]:
-    """Return the hypotheses that are left beside the one that is told, if one is, at most so many; or else the
-    runner-up.
+    """Return the remaining hypotheses, at most `most`, without the reported one, if there is one; if none remains,
+    the runner-up.
     """
     listed = [ids for ids in left if ids != reported][:most]
     ranked: Sequence[Ids] = sorted(inside, key=lambda ids: -inside[ids])
@@ -172,7 +173,9 @@ def _rival(work: Findings, best: Candidate, ids: Ids, p: float) -> Rival:
 
 
 def between(problem: Problem, fit: Fit, ids: Ids, others: Ids) -> float:
-    """Return D of causes as they are in a fit against others; of nothing, against what they would be in full size."""
+    """Return D of causes as they are in a fit against others; of no cause, D against the others at one effect
+    scale.
+    """
     if not ids:
         return between(problem, _scaled(problem, fit, others), others, ids) if others else 0.0
     own = columns_of(problem.entries, ids)
@@ -185,7 +188,7 @@ def between(problem: Problem, fit: Fit, ids: Ids, others: Ids) -> float:
 
 
 def _scaled(problem: Problem, fit: Fit, ids: Ids) -> Fit:
-    """Return a fit with causes of one effect scale in it."""
+    """Return a fit with causes set to one effect scale."""
     z = fit.z.copy()
     for k in columns_of(problem.entries, ids):
         z[k] = problem.entries[k].parameter.scale
@@ -193,7 +196,7 @@ def _scaled(problem: Problem, fit: Fit, ids: Ids) -> Fit:
 
 
 def rival_of(work: Findings, what: FittedChangePoint, probability: float) -> Rival:
-    """Return a sudden cause as a rival of what is told."""
+    """Return a cause with a change point as a rival of the reported explanation."""
     cause = cause_of(work, what, probability)
     sentence = what.change_point.with_onset.sentence
     return Rival(
@@ -207,7 +210,7 @@ def rival_of(work: Findings, what: FittedChangePoint, probability: float) -> Riv
 
 
 def closest_rival(work: Findings, inside: Mapping[Ids, float], D: float, ids: Ids) -> Rival:
-    """Return what comes closest to the most probable sudden cause, at a distance D, as a rival."""
+    """Return the explanation closest to the most probable change point, at a distance D, as a rival."""
     words = " and ".join(_words(work, cause_id) for cause_id in ids) or "nothing is wrong"
     return Rival(ids=ids, sentence=words, probability=inside.get(ids, 0.0), discrimination=D)
 
@@ -228,13 +231,13 @@ OUTSIDE_SENTENCES = {
 
 
 def force_rival(work: Findings, ids: Ids, probability: float) -> Rival:
-    """Return a force or a drift, with the causes beside it, as a rival."""
+    """Return a force or a drift, with the causes that it is added to, as a rival."""
     words = [*(sentence_of(work.problem, cause_id) for cause_id in ids[:-1]), OUTSIDE_SENTENCES[ids[-1]]]
     return Rival(ids=ids, sentence=" and ".join(words), probability=probability, discrimination=math.nan)
 
 
 def names_of(whole: Sequence[Ids], others: Sequence[Rival]) -> list[str]:
-    """Return the names of all that the records cannot tell apart."""
+    """Return the names of all explanations that the records cannot tell apart."""
     return list(dict.fromkeys([*map(name, whole), *(name(other.ids) for other in others)]))
 
 
@@ -244,13 +247,13 @@ MENTIONED_PROBABILITY = 0.01
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Extension:
-    """What a verdict adds to the model.
+    """The additions of a verdict to the model.
 
     Attributes:
-        fit: the best fit with it.
-        problem: whose entries the fit has.
+        fit: the best fit with them.
+        problem: of that fit.
         extended: the model.
-        unknown: the force that is missing.
+        unknown: the latent force or drift.
         cause: the cause that begins in mid-trial.
     """
 
@@ -262,18 +265,18 @@ class Extension:
 
     @property
     def id(self) -> str:
-        """Of the sudden cause, such as "rudder_offset@12"; "" if there is none."""
+        """Id of the cause with a change point, such as "rudder_offset@12"; "" if there is none."""
         return f"{self.cause.id}@{self.cause.start_time:g}" if self.cause else ""
 
     @property
     def is_new(self) -> bool:
-        """There is new physics in it that data may be explained by: no mere calibration, and no sensor that drifts."""
+        """It has new physics that may explain data: more than a calibration, and no drift of a sensor."""
         drifts = self.unknown is not None and self.unknown.is_drift
         return bool(self.extended.deviations or self.extended.missing) and not drifts
 
 
 def of_causes(work: Findings, best: Candidate, ids: Ids) -> Extension:
-    """Return the extension by those causes of a candidate that are named."""
+    """Return the extension by the named causes of a candidate."""
     extended = Extended(
         deviations=by_effect(work.problem, best.fit.z, ids),
         calibration=by_effect(work.problem, best.fit.z, None, but=ids),
@@ -282,7 +285,7 @@ def of_causes(work: Findings, best: Candidate, ids: Ids) -> Extension:
 
 
 def of_nothing(work: Findings, best: Candidate) -> Extension:
-    """Return the model as calibrated within tolerances, with nothing new in it."""
+    """Return the model as calibrated within tolerances, without new causes."""
     fit = best.fit if len(best.ids) == 0 else work.search.candidates[()].fit
     return Extension(
         fit=fit, problem=work.problem, extended=Extended(calibration=by_effect(work.problem, fit.z, None))
@@ -292,15 +295,15 @@ def of_nothing(work: Findings, best: Candidate) -> Extension:
 def most_probable_force(work: Findings) -> tuple[OutOfCatalogue, LatentForceCandidate]:
     """Return the most probable latent force or drift, with the causes that it was found with."""
     return next(
-        (outside, outside.what)
-        for outside in work.out_of_catalogue
-        if isinstance(outside.what, LatentForceCandidate)
+        (candidate, candidate.what)
+        for candidate in work.out_of_catalogue
+        if isinstance(candidate.what, LatentForceCandidate)
     )
 
 
 def of_unknown(work: Findings) -> Extension:
-    """Return the extension by the most probable force, with the noise beside it; beside the drift of a sensor there is
-    nothing new but causes.
+    """Return the extension by the most probable force, with its own noise; for the drift of a sensor only the causes
+    that it is added to are new.
     """
     explanation, _ = most_probable_force(work)
     found = _estimated(work, explanation)
@@ -313,7 +316,9 @@ def of_unknown(work: Findings) -> Extension:
 
 
 def _as_formula(unknown: Unknown, formula: Formula) -> Unknown:
-    """Return a force as its formula tells it, if there is one: far closer to what acts than the free history."""
+    """Return a force with the history of its formula, if there is one: it is far closer to the true force than the
+    free history.
+    """
     if not formula.shapes or formula.log_gain <= 0.0:
         return unknown
     times = samples_of(float(unknown.time[-1]))
@@ -330,7 +335,7 @@ def _as_formula(unknown: Unknown, formula: Formula) -> Unknown:
 
 
 def curves_outside(work: Findings, explanation: OutOfCatalogue, label: str) -> dict[str, Curves]:
-    """Return record → curves of a force, or of a drift with what the sensor makes of it, as one model."""
+    """Return record → curves of a force, or of a drift as the sensor shows it, as one model."""
     found = _estimated(work, explanation)
     made = curves(found.problem, {label: found.fit})
     for i, record in enumerate(found.problem.records if found.missing is None else ()):
@@ -342,7 +347,7 @@ def curves_outside(work: Findings, explanation: OutOfCatalogue, label: str) -> d
 
 
 def _estimated(work: Findings, explanation: OutOfCatalogue) -> EstimatedForce:
-    """Return a force or a drift, fitted beside the causes that it stands beside."""
+    """Return a force or a drift, fitted with the causes that it is added to."""
     problem = explanation.own or work.problem
     base = work.search.candidates[explanation.causes]
     assert isinstance(explanation.what, LatentForceCandidate)
@@ -356,7 +361,7 @@ def _estimated(work: Findings, explanation: OutOfCatalogue) -> EstimatedForce:
 
 
 def of_sudden(work: Findings, what: FittedChangePoint, cause: Cause) -> Extension:
-    """Return the extension by a cause that begins in mid-trial, as it is fitted."""
+    """Return the extension by a cause that begins in mid-trial, as fitted."""
     extended = Extended(
         deviations={cause.id: {parameter: each.deviation for parameter, each in cause.parameters.items()}},
         start_times={cause.id: what.change_point.time},

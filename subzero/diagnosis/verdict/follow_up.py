@@ -1,10 +1,10 @@
-"""What a verdict needs that only simulations can tell: distances to rivals, a latent force, gain, next trial, curves.
+"""The parts of a verdict that need simulations: distances to rivals, a latent force, gain, next trial, curves.
 
-A change point has its own distance to others from the same time on, with the onset free:
+A change point has its own distance to others with the same onset, with the onset free:
 
     D = sᵀ (I + B Bᵀ)⁻¹ s,    B = [J κτ, C s_b]
 
-Rivals that are improbable by luck alone are fitted, too, where the records decide nothing.
+Rivals that may be improbable only by chance are fitted, too, where the verdict is undecided.
 """
 
 from __future__ import annotations
@@ -69,20 +69,20 @@ if TYPE_CHECKING:
     from subzero.diagnosis.inference.model_search import Search
 
 RIVALS_DRAWN = {CAUSE_NAMED: 1, OUTSIDE: 1, NOTHING_NEAR: 1, CALIBRATED: 0, NOTHING_WRONG: 0}
-"""Verdict → so many rivals are drawn; of what is undecided all that is named."""
+"""Verdict → number of rivals that are drawn; in an undecided one all that are named."""
 MAX_SURVIVORS = 4
-"""At most so many hypotheses are to be told apart by the next trial."""
+"""Most hypotheses that the next trial is to tell apart."""
 
 
 def ranked(findings: Findings) -> Ranked:
     """Return all explanations by their probability, with the closest rivals of the first."""
-    inside, outside = shares(findings.search, findings.out_of_catalogue)
+    inside, added = shares(findings.search, findings.out_of_catalogue)
     candidates = findings.search.candidates
     best = candidates[max((ids for ids in inside if ids in candidates), key=lambda ids: inside[ids])]
     change_points = _change_points(findings)
     return Ranked(
         inside=inside,
-        outside=outside,
+        outside=added,
         close_to_change_point=_closest(findings, change_points[0]) if change_points else ClosestRival(),
         best=best,
         close_to_best=_close_to(findings, best, practical_of(findings, best)),
@@ -91,7 +91,7 @@ def ranked(findings: Findings) -> Ranked:
 
 
 def follow_up(findings: Findings, known: Ranked) -> FollowUp:
-    """Return what the verdict of ranked explanations needs."""
+    """Return the results that the verdict on ranked explanations needs."""
     verdict, candidates = decided(findings, known), findings.search.candidates
     new = _extension(findings, known, verdict)
     left = _with_closest(findings, known, verdict, remaining_models(known))
@@ -119,7 +119,7 @@ def _change_points(findings: Findings) -> list[FittedChangePoint]:
 
 
 def _close_to(findings: Findings, best: Candidate, ids: Ids) -> ClosestRival:
-    """Return the closest rival of causes as they are in a candidate; none of no causes."""
+    """Return the closest rival of causes as they are in a candidate; none if there are no causes."""
     if not ids:
         return ClosestRival()
     J = with_whole_effects(findings.problem, best.fit.J, best.fit.z)
@@ -128,8 +128,8 @@ def _close_to(findings: Findings, best: Candidate, ids: Ids) -> ClosestRival:
 
 
 def _closest(findings: Findings, fitted: FittedChangePoint) -> ClosestRival:
-    """Return what comes closest to a change point: the tolerances, a cause that holds throughout, or another from its
-    time on.
+    """Return the closest rival of a change point: the tolerances, a cause that holds throughout, or another with its
+    onset.
     """
     n, more = len(findings.problem.entries), fitted.problem
     M, own = marginal(more, fitted.fit.J, fitted.change_point.kappa), list(range(n, len(more.entries) - 1))
@@ -144,11 +144,12 @@ def _closest(findings: Findings, fitted: FittedChangePoint) -> ClosestRival:
 
 
 def _from_its_time_on(findings: Findings, fitted: FittedChangePoint) -> dict[Ids, float]:
-    """Return D against each other cause that would begin when it does: what no tolerance and no size of that explains,
+    """Return D against each other cause with the same onset: the part of the response that no tolerance and no size
+    of the other explains,
 
     D = sᵀ (I + B Bᵀ)⁻¹ s,    B = [J κτ, C s_b]
 
-    A jam of a fin with no command lost is an offset of the fin: what both do is no rival of either.
+    A jam of a fin with no command lost is an offset of the fin: a cause that does the same is no rival.
     """
     started, fit, n = fitted.change_point, fitted.fit, len(findings.problem.entries)
     others = [effect for effect in findings.problem.sudden_effects if effect.id != started.effect.id]
@@ -169,7 +170,7 @@ def _from_its_time_on(findings: Findings, fitted: FittedChangePoint) -> dict[Ids
 
 
 def _extension(findings: Findings, known: Ranked, verdict: str) -> Extension:
-    """Return what a verdict adds to the model."""
+    """Return the additions of a verdict to the model."""
     best = known.best
     if verdict == CAUSE_NAMED and known.change_point.is_named:
         first = known.change_points[0]
@@ -182,8 +183,8 @@ def _extension(findings: Findings, known: Ranked, verdict: str) -> Extension:
 
 
 def _with_closest(findings: Findings, known: Ranked, verdict: str, left: RemainingModels) -> RemainingModels:
-    """Return what is left; where the records decide nothing and leave one explanation, its closest rival, too, which
-    may be improbable by luck alone.
+    """Return the remaining models; where the verdict is undecided and one explanation remains, with its closest rival
+    added, which may be improbable only by chance.
     """
     hypotheses, late, best = left.hypotheses, left.change_points, known.best
     if verdict != UNDECIDED:
@@ -204,7 +205,9 @@ def _with_closest(findings: Findings, known: Ranked, verdict: str, left: Remaini
 
 
 def _gained(findings: Findings, new: Extension, rival: Fit | None) -> Gain:
-    """Return what an extension explains of held-out data, beside a refit within tolerances and the best rival."""
+    """Return the gain of an extension on held-out data, compared with a refit within tolerances and the best
+    rival.
+    """
     tolerance = Fitted(findings.problem, findings.search.candidates[()].fit)
     other = Fitted(findings.problem, rival) if rival else None
     nominal = findings.search.nominal[0]
@@ -213,15 +216,15 @@ def _gained(findings: Findings, new: Extension, rival: Fit | None) -> Gain:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CalibrationFromOnset:
-    """A sudden cause as it will be in trials to come: throughout. As an `outlook.Survivor`."""
+    """A cause with a change point as it will be in trials to come: throughout. As a `next_trial.Survivor`."""
 
     ids: Ids
     fit: Fit
 
 
 def _calibration_from_onset(findings: Findings, what: FittedChangePoint) -> CalibrationFromOnset | None:
-    """Return a sudden cause as one that holds throughout, as large (or grown) as it is at the end of its record, with
-    what the records say of its size; None of a jam, which is no deviation of a fin that follows.
+    """Return a cause with a change point as one that holds throughout, as large (or grown) as it is at the end of its
+    record, with the posterior of its size; None for a jam, which is no deviation of a fin that follows its command.
     """
     n, fit, effect = len(findings.problem.entries), what.fit, what.change_point.effect
     at = columns_of(findings.problem.entries, (effect.grows or effect.id,))
@@ -235,8 +238,8 @@ def _calibration_from_onset(findings: Findings, what: FittedChangePoint) -> Cali
 
 
 def _survivors(findings: Findings, left: RemainingModels) -> list[Survivor]:
-    """Return what the next trial is to tell apart; what broke stays broken, so that it is the same as if it had always
-    been.
+    """Return the explanations that the next trial is to tell apart; a fault in mid-trial persists, so that it is the
+    same as one that holds throughout.
     """
     candidates = findings.search.candidates
     found: list[Survivor] = [candidates[ids] for ids in left.hypotheses if ids in candidates]
@@ -251,7 +254,7 @@ def _survivors(findings: Findings, left: RemainingModels) -> list[Survivor]:
 def _next_trial(
     findings: Findings, left: RemainingModels, probabilities: Mapping[Ids, float]
 ) -> NextTrial | None:
-    """Return the trial that would best tell apart the most probable of what is left."""
+    """Return the trial that would best tell apart the most probable remaining explanations."""
     survivors = sorted(_survivors(findings, left), key=lambda survivor: -probabilities.get(survivor.ids, 0.0))
     few = survivors[:MAX_SURVIVORS]
     findings.search.progress(
@@ -264,28 +267,28 @@ def _next_trial(
 def _curves(
     findings: Findings, verdict: str, new: Extension, known: Ranked, rivals: Sequence[Ids]
 ) -> dict[str, Curves]:
-    """Return record → curves of the nominal model, of the refits, and of as many rivals as are drawn, in their order:
-    causes that hold throughout, those that began in mid-trial, forces and drifts, each with the problem that it was
+    """Return record → curves of the nominal model, of the refits, and of the rivals that are drawn, in their order:
+    causes that hold throughout, those that began in mid-trial, forces and drifts, each in the problem that it was
     fitted in.
     """
     candidates = findings.search.candidates
     late: dict[Ids, FittedChangePoint] = {(point.id,): point for point in _change_points(findings)}
     fits: dict[str, Fit | None] = {"nominal": None, "tolerance": candidates[()].fit}
     fits |= {"extended": new.fit} if verdict in (CAUSE_NAMED, OUTSIDE) else {}
-    outside = {(*candidate.causes, candidate.id): candidate for candidate in findings.out_of_catalogue}
+    added = {(*candidate.causes, candidate.id): candidate for candidate in findings.out_of_catalogue}
     if verdict == UNDECIDED:
         drawn = [ids for ids in worth_naming(known.probabilities) if ids]
     else:
         drawn = [ids for ids in rivals if ids in candidates or ids in late][: RIVALS_DRAWN[verdict]]
     fits |= {f"rival: {name(ids)}": candidates[ids].fit for ids in drawn if ids in candidates}
     found = curves(new.problem, fits)
-    for ids in (ids for ids in drawn if ids not in candidates and (ids in late or ids in outside)):
+    for ids in (ids for ids in drawn if ids not in candidates and (ids in late or ids in added)):
         label = f"rival: {name(ids)}"
-        what = late.get(ids) or outside[ids].what
+        what = late.get(ids) or added[ids].what
         if isinstance(what, FittedChangePoint):
             own = curves(what.problem, {label: what.fit})
         else:
-            own = curves_outside(findings, outside[ids], label)
+            own = curves_outside(findings, added[ids], label)
         found = {
             record: replace(candidate, models={**candidate.models, **own[record].models})
             for record, candidate in found.items()
@@ -294,9 +297,10 @@ def _curves(
 
 
 def refuted_rivals(search: Search) -> frozenset[str]:
-    """Return the rivals of the best hypothesis that only the linear problem has close, as simulations show.
+    """Return the rivals of the best hypothesis that are close only in the linear problem, as simulations show.
 
-    A play of the rudder may look like its offset from where there is none, and explain nothing of a record.
+    Linearised where there is none, a play of the rudder may look like its offset, and yet explain nothing of a
+    record.
     """
     best, problem, found = search.best(), search.problem, set[str]()
     J = with_whole_effects(problem, best.fit.J, best.fit.z)

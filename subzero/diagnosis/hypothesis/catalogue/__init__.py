@@ -21,8 +21,9 @@ from subzero.files.read_file import MOST_OF_A_PROGRAM, read_bytes
 
 __all__ = ["NOISE", "ONSETS", "SAMPLED", "SPECS", "START", "all_effects", "catalogue", "load"]
 ONSETS = (*fins.ONSETS, *hull.ONSETS, *propulsion.ONSETS)
-"""What can only begin in mid-trial: a jam is no small deviation from a fin that follows, and a growth has a time to
-begin at. Neither is a tolerance of a healthy vehicle, and so no part of every fit."""
+"""Effects that can only begin in mid-trial: a jam is no small deviation of a fin that follows its command, and a
+growth has an onset. Neither has a tolerance in a healthy vehicle, and so they are no part of every fit.
+"""
 
 
 @checked_arguments
@@ -38,13 +39,13 @@ def catalogue(channels: Iterable[str], more: Iterable[Effect] = ()) -> dict[str,
 
 @checked_arguments
 def all_effects(more: Iterable[Effect] = ()) -> dict[str, Effect]:
-    """Return every effect there is, by id: of the start, of all sensors, and what only begins in mid-trial, too."""
+    """Return every effect by id, with those of the start, of all sensors, and those that only begin in mid-trial."""
     return {**catalogue(sensors.SPECS, more), **{effect.id: effect for effect in (*START, SAMPLED, *ONSETS)}}
 
 
 @checked_arguments
 def load(path: str | Path) -> tuple[Effect, ...]:
-    """Return the effects of a user's file, which is run.
+    """Return the effects of a user's file, which is executed.
 
     Raises:
         UserError: there is no such file, or it has no list EFFECTS of effects.
@@ -65,5 +66,5 @@ def load(path: str | Path) -> tuple[Effect, ...]:
 
 @cache
 def _installed() -> tuple[Effect, ...]:
-    """Return the effects that installed packages bring; to look for them takes as long as several runs."""
+    """Return the effects of installed packages; finding them takes as long as several simulations."""
     return tuple(effect for entry in entry_points(group="subzero.effects") for effect in entry.load())

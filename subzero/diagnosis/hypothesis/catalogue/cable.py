@@ -1,4 +1,4 @@
-"""What can be wrong with cable, drum and water."""
+"""Effects of the cable, the drum and the water."""
 
 from __future__ import annotations
 

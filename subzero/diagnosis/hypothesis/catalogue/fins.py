@@ -1,4 +1,4 @@
-"""What can be wrong with rudders and stern-planes."""
+"""Effects of rudders and stern-planes."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def stern_plane_offset(setting: Setting, common: float, differential: float) -> 
 
 
 def _jam(servo: str, setting: Setting, lost: float, angle: float) -> Setting:
-    """The servo loses a share of its command, and its fin stands off by an angle."""
+    """The servo loses a share of its command, and its fin has an offset by an angle."""
     changes: dict[str, Callable[[float], float]] = {
         f"{servo}__lost_command": lambda old: min(old + lost, 1.0),
         f"{servo}__offset": lambda old: old + radians(angle),
@@ -184,4 +184,4 @@ ONSETS = (
         "stern_plane_offset",
     ),
 )
-"""What can only begin in mid-trial."""
+"""Effects that can only begin in mid-trial."""

@@ -1,4 +1,4 @@
-"""What can be wrong with the hull."""
+"""Effects of the hull."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def sway_damping(setting: Setting, share: float) -> Setting:
 
 
 def _fins(vehicle: Vehicle, power: int) -> float:
-    """Return what the two rudders add to Y_uv (power 0) or N_ur (power 2): ρ S C_Lα x_fᵖ. [kg/m, kg m]."""
+    """Return the contribution of the two rudders to Y_uv (power 0) or N_ur (power 2): ρ S C_Lα x_fᵖ. [kg/m, kg m]."""
     fin = vehicle.rudder
     return vehicle.water.density * fin.area * fin.lift_slope * fin.station**power
 
@@ -63,7 +63,7 @@ def cg_offset(setting: Setting, millimetres: float) -> Setting:
 
 
 def roll_stiffness(setting: Setting, share: float) -> Setting:
-    """z_b + (z_g − z_b)(1 + share) in the place of z_g."""
+    """z_b + (z_g − z_b)(1 + share) instead of z_g."""
     low = setting.model.vehicle.rigid_body.centre_of_gravity_z
     arm = low - setting.model.vehicle.buoyancy.centre_of_buoyancy_z
     return setting.with_vehicle(rigid_body__centre_of_gravity_z=low + share * arm)
@@ -157,4 +157,4 @@ ONSETS = (
         _BY_ID["hull_drag"], "fouling", "the drag of the hull grows or falls: it gathers weed, or sheds it"
     ),
 )
-"""What grows from some time on."""
+"""Effects that grow from an onset on."""

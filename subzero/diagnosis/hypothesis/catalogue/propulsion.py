@@ -1,4 +1,4 @@
-"""What can be wrong with propeller, motor and battery."""
+"""Effects of propeller, motor and battery."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter, growing
 
 CHARGE = 60.0
-"""What 2 A draw from the battery in 30 s: sag is told for this much. [C]"""
+"""Charge that 2 A draw from the battery in 30 s: sag is stated for this charge. [C]"""
 
 
 def propeller_thrust_gain(setting: Setting, share: float) -> Setting:
@@ -95,4 +95,4 @@ _BY_ID = {effect.id: effect for effect in EFFECTS}
 ONSETS = (
     growing(_BY_ID["propeller_thrust_gain"], "fading_thrust", "the thrust of the propeller fades or grows"),
 )
-"""What grows from some time on."""
+"""Effects that grow from an onset on."""

@@ -1,7 +1,7 @@
-"""What each record has of its own.
+"""Effects of a single record.
 
-What can be wrong with its sensors and their clock: an effect per channel and kind, made from one table. And how the
-vehicle may lie at the start, never a cause, always free within its tolerance.
+Errors of its sensors and their clock: an effect per channel and kind, made from one table. And the vehicle's state at
+the start, never a cause, always free within its tolerance.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from subzero.errors import chosen
 
 
 class Spec(NamedTuple):
-    """What a usual sensor is like: noise, tolerance of bias, in the display unit; words."""
+    """A usual sensor: noise, tolerance of bias, in the display unit; words."""
 
     noise: float
     bias: float
@@ -45,7 +45,7 @@ SPECS: dict[str, Spec] = {
     "east": Spec(0.2, 0.1, "eastward position"),
     "speed_over_ground": Spec(0.015, 0.005, "speed over ground"),
 }
-"""Channel → sensor. What is not in the table cannot be diagnosed from."""
+"""Channel → sensor. A channel that is not in the table cannot be used in a diagnosis."""
 
 NOISE = {name: spec.noise for name, spec in SPECS.items()}
 SCALE, LAG = (0.01, 0.10), (0.02, 0.20)
@@ -115,7 +115,7 @@ CLOCK = Effect(
 
 
 def _sampled(setting: Setting, share: float) -> Setting:
-    """Share of its interval by which a measurement happened later than it says + share."""
+    """Share of its interval by which a measurement was taken later than its time + share."""
     from dataclasses import replace
 
     return replace(setting, sampled=setting.sampled + share)
@@ -130,8 +130,9 @@ SAMPLED = Effect(
     ),
     apply=_sampled,
 )
-"""When in its interval a measurement happened that a logger held, drew lines to, or averaged: any time is as likely, so
-that the variance is 1/12. Each record has its own, never named."""
+"""Time within its interval at which a measurement was taken that a logger held, interpolated, or averaged: uniform,
+so that the variance is 1/12. Each record has its own, never named.
+"""
 
 
 def _turned(key: str) -> Callable[[Setting, float], Setting]:
@@ -167,4 +168,4 @@ START = (
     _nuisance("depth", "m", 0.01),
     _nuisance("surge_speed", "m/s", 0.005),
 )
-"""What is free at the start of every trial, each with its own, and never named."""
+"""Effects of the start that are free in every trial, with values of its own, and never named."""
