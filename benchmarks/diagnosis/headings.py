@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 import subzero
-from subzero.records.record import Record, beside, fit, modelled
+from subzero.records.record import Record, fit, modelled, with_heading_of
 
 NOISE = {
     "surge_speed": 0.015,
@@ -108,7 +108,7 @@ def measured(run, rng: Rng, with_rate: bool) -> Record:
 
 def rmse(run, record: Record) -> float:
     """Return the error of the heading as `subzero compare` reports it."""
-    return fit(run, beside(record, modelled(run, "heading", record.time)), "heading").rmse
+    return fit(run, with_heading_of(record, modelled(run, "heading", record.time)), "heading").rmse
 
 
 def scenario(folder: Path, heading: float, rudder: float) -> Path:

@@ -67,7 +67,7 @@ def test_an_autopilot_delivers_a_step(tmp_path, capsys):
 
 
 @pytest.mark.parametrize(
-    "words,told",
+    "words,reported",
     [
         (["manoeuvre", "zigzagg"], "Did you mean 'zigzag'"),
         (["manoeuvre", "zigzag", "--planes", "5"], "Use --rudder"),

@@ -114,7 +114,7 @@ def test_a_run_that_cannot_go_on_stops_with_what_it_has():
 
 
 @pytest.mark.parametrize(
-    "scenario,options,told",
+    "scenario,options,reported",
     [
         ("fig6", {"sample_time": 0.05}, "whole number of cable steps, 0.1 s each"),
         ("fig6", {"sample_time": float("nan")}, "it must be a finite number or None"),

@@ -123,7 +123,7 @@ def test_a_turn_with_a_jammed_rudder_is_refused(model):
 
 
 @pytest.mark.parametrize(
-    "asked,told",
+    "asked,reported",
     [
         ({"speed": 3.0}, "propeller would need"),
         ({"speed": 1.0, "turn_rate": 0.5}, "rudder would need"),
@@ -138,7 +138,7 @@ def test_what_cannot_be_trimmed_is_told_with_its_limit(model, asked, reported):
 
 
 @pytest.mark.parametrize(
-    "asked,told",
+    "asked,reported",
     [
         ({"speed": 0.0}, "above 0"),
         ({"speed": float("nan")}, "finite"),

@@ -16,7 +16,7 @@ import subzero
 from scenarios.heading import continuous, contradicted, expected
 from subzero import autopilot
 from subzero.errors import UserError
-from subzero.records.record import Record, beside, fit, modelled, read_record
+from subzero.records.record import Record, fit, modelled, read_record, with_heading_of
 
 TIME = np.arange(0.0, 30.0, 0.1)
 TURNING = 330.0 + 10.0 * np.maximum(TIME - 2.0, 0.0)
@@ -61,7 +61,7 @@ def test_bad_samples_lose_no_turn_and_are_left_out(bad, with_rate):
     values = {"heading": heading}
     if with_rate:
         values["yaw_rate"] = np.gradient(TURNING, TIME)
-    record = beside(Record(source="", time=TIME, values=values), modelled(run, "heading", TIME))
+    record = with_heading_of(Record(source="", time=TIME, values=values), modelled(run, "heading", TIME))
     assert fit(run, record, "heading").rmse < 1.1 * 0.4
     assert bool(record.notes) == (bad is not lost)
     assert np.isfinite(record.values["heading"]).sum() >= (100 if bad is lost else 285)

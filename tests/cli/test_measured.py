@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 from subzero.cli.app import FINE, MISTAKE, main
 from subzero.errors import UserError
-from subzero.records.record import Record, beside, fit, modelled, read_record
+from subzero.records.record import Record, fit, modelled, read_record, with_heading_of
 
 
 @pytest.fixture
@@ -149,7 +149,7 @@ def test_a_heading_measured_whole_turns_away_is_the_same_heading(offset, make_ru
     record = Record(
         source="", time=run["time"].values, values={"heading": run["heading"].values - 720.0 + offset}
     )
-    assert fit(run, beside(record, modelled(run, "heading", record.time)), "heading").bias == pytest.approx(
+    assert fit(run, with_heading_of(record, modelled(run, "heading", record.time)), "heading").bias == pytest.approx(
         -offset, abs=1e-9
     )
 

@@ -10,7 +10,8 @@ import threading
 
 import pytest
 
-from subzero.cli.app import FINE, INTERRUPTED, MISTAKE, STOPPED, interrupts, main
+from subzero.cli import interrupts
+from subzero.cli.app import FINE, INTERRUPTED, MISTAKE, STOPPED, main
 from subzero.files.read_file import INCOMPLETE
 
 

@@ -38,7 +38,7 @@ def found(plant):
     )
     search = Search(problem=planted.problem, progress=lambda share, words: None)
     search.begin()
-    search.look()
+    search.screen_causes()
     search.fit_all([(), ("rudder_offset",), ("yaw_damping",)])
     search.refine()
     findings = Findings(search=search, budget="verdict")

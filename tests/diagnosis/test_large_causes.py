@@ -47,7 +47,7 @@ def test_a_clock_between_the_sizes_that_are_tried_is_seen_from_afar(scenario, la
     search.begin()
     assert search.is_far
     search.only_nothing()
-    search.look()
+    search.screen_causes()
     assert search.screen.best(1, 1, np.inf) == [("clock_offset",)]
     search.fit_large_effects()
     assert not search.is_poor()

@@ -150,7 +150,7 @@ def fitted_change_point(name, log_posterior):
 
 
 @pytest.mark.parametrize(
-    "ahead, told", [(0.0, ["rudder_offset"]), (1.0, ["rudder_offset"]), (5.0, ["rudder_jam"])]
+    "ahead, reported", [(0.0, ["rudder_offset"]), (1.0, ["rudder_offset"]), (5.0, ["rudder_jam"])]
 )
 def test_a_jam_that_is_not_needed_is_told_as_the_offset(ahead, reported):
     """Four times as probable (1.4 nats) is what it needs; the offset has the probability of both then."""

@@ -78,7 +78,7 @@ def test_the_command_line_refuses_what_does_not_fit(tmp_path, monkeypatch, capsy
 
 def test_a_run_that_outgrows_the_memory_keeps_what_it_has(fig6, monkeypatch):
     whole = subzero.simulate(fig6)
-    monkeypatch.setattr("subzero.simulation.run.has_room", lambda _: False)
+    monkeypatch.setattr("subzero.simulation.run.fits_in_memory", lambda _: False)
     monkeypatch.setattr("subzero.simulation.run.new_recording", with_little_room)
     run = subzero.simulate(fig6)
     assert run.attrs["outcome"] == "stopped"
@@ -170,7 +170,7 @@ def test_a_command_whose_run_stands_still_says_so_while_it_computes(tmp_path, mo
     tell = ProgressBar._notify
     monkeypatch.setattr(ProgressBar, "_notify", lambda self, *words: (tell(self, *words), reported.set()))
     monkeypatch.setattr("subzero.cli.progress.STANDSTILL_S", 0.05)
-    monkeypatch.setattr("subzero.cli.progress.LOOK_S", 0.01)
+    monkeypatch.setattr("subzero.cli.progress.CHECK_S", 0.01)
     monkeypatch.setattr("subzero.simulation.run.simulate", stuck)
     monkeypatch.chdir(tmp_path)
     assert main(["simulate", "fig6"]) == MISTAKE
