@@ -1,6 +1,6 @@
-"""Why the numbers of a cable may be wrong: what each says of a run, a trial with a vehicle uses alike.
+"""Reasons why the numbers of a cable may be wrong; runs of a cable alone and trials with a vehicle share them.
 
-    energy      what is missing in the balance of work and losses, as a share of them
+        energy      residual of the balance of work and losses, as a share of them
     roughness   |F(t−h) − 2F(t) + F(t+h)| / max |F|: a tow force that jumps from sample to sample is not resolved
     slack       cable that is longer than the way between its nodes, or pulls at neither end of a segment
     surface     cable above down = 0 and above its ends: in the air, if down is depth
@@ -85,7 +85,7 @@ def doubts_of(
     tensions: Sequence[np.ndarray],
     energy_residual: float,
 ) -> tuple[str, ...]:
-    """Return why the numbers of a run may be wrong, in sentences; none if nothing is known against them.
+    """Return why the numbers of a run may be wrong, in sentences; none if no check finds a reason.
 
     Args:
         time: of the samples (samples,). [s]
@@ -93,7 +93,7 @@ def doubts_of(
         length: of the cable (samples,). [m]
         shapes: node positions, an array (nodes, 3) a sample. [m]
         tensions: at the nodes, an array (nodes,) a sample. [N]
-        energy_residual: what is missing in the balance of energies; NaN where nothing is booked. [-]
+            energy_residual: residual of the energy balance; NaN where no energies are recorded. [-]
     """
     found = []
     if energy_residual > RESIDUAL:

@@ -46,8 +46,8 @@ class Outcome:
         worst_residual: residual left in the last step, as a multiple of its tolerance.
         steps: how many steps were taken, with those that were made smaller than the time between two results.
         largest_courant_number: √(T/m1) Δt/Δs, how many segments a transverse wave crosses in a step, at most.
-        energy_residual: what is missing in the balance of `moving_end.energy`, as a share of the work and the loss in
-            all.
+            energy_residual: residual of the balance of `moving_end.energy`, as a share of the total of the work and
+                the loss.
     """
 
     completed: bool
@@ -121,7 +121,7 @@ class History:
         return doubts_of(self.time, self.tow_force, self.length, self.shapes, self.tensions, how)
 
     def diagnostics(self) -> Mapping[str, float]:
-        """Return the numbers that tell how far to trust the run, by name."""
+        """Return the numbers that show how far to trust the run, by name."""
         return {
             "closure_error_m": float(self.closure_error.max()),
             "smallest_tension_N": float(min(tension.min() for tension in self.tensions)),
@@ -136,8 +136,8 @@ class History:
         """Return the run as an xarray dataset: time, node and axis named, units and words on everything.
 
         Variables are the fields of this class; the shapes are ``position``, the tensions ``tension`` (time, node), with
-        the coordinate ``arc_length``, the distance along the nodes from the tow point. Rows have room for the most
-        nodes, and NaN behind the last one.
+        the coordinate ``arc_length``, the distance along the nodes from the tow point. Rows are as long as the
+        largest number of nodes requires, and are padded with NaN after the last one.
 
         >>> import cable
         >>> run = cable.pull_out(lambda t: (1.0, 0.0, 0.0), 2.0).to_dataset()

@@ -22,7 +22,7 @@ Place = Sequence[float] | np.ndarray
 """North, east, down. [m]"""
 
 SEGMENTS = 100
-"""So many where nobody asks for a segment length: a catenary's force is then right within about 1e-4."""
+"""Number of segments if no segment length is given: the force of a catenary is then right within about 1e-4."""
 MOST_SEGMENTS = 100_000
 MOST_STRAIN = 1.0
 """A cable that is pulled to more than twice its length is a mistake."""
@@ -33,7 +33,7 @@ RESCALINGS = 3
 WEIGHTLESS = 1e-9
 """A cable with less tension than this has no load at all. [N]"""
 TAUT = 1.0 - 1e-9
-"""An unstretchable cable whose ends are this share of its length apart has no tension that weight could tell."""
+"""If the ends of an unstretchable cable are this share of its length apart, weight does not determine its tension."""
 
 
 class HoldError(UserError, ValueError):
@@ -149,7 +149,7 @@ def _checked_ends(ends: Sequence[Place] | np.ndarray) -> np.ndarray:
 
 
 def _positive(name: str, given: object) -> float:
-    """Return a length as a float, or refuse what is none [m]."""
+    """Return a length as a float [m]; raise an error if it is not positive and finite."""
     length = real(given)
     if length is None or length <= 0.0:
         message = f"hold: {name} is {short(given)}; it must be a positive number of metres."

@@ -7,7 +7,8 @@ from subzero.errors import UserError
 SHARE = 0.8
 """A run may ask for this share of the memory that is free. [-]"""
 SMALL = 2.0**24
-"""So little is had without a look at what is free, which takes longer than a second of a short run. [bytes]"""
+"""Up to this size no check of the free memory is made, as the check takes longer than a second of a short run.
+[bytes]"""
 GIB = 1024.0**3
 
 

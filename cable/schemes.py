@@ -22,7 +22,7 @@ from subzero.errors import BadValueError, checked, short, suggestion, truth
 SHORTEST_S = 1e-9
 """A run or a step that is shorter cannot be halved where it is difficult: what it is halved to is rounded away. [s]"""
 TOLERANCE = 1e-9
-"""How exactly a step is solved where nobody asks for less: this share of the largest tension, strains of 1e-12. [-]"""
+"""How exactly a step is solved by default: this share of the largest tension, strains of 1e-12. [-]"""
 FINEST, COARSEST = 1e-12, 1e-3
 """Between these a tolerance makes sense: rounding is below, and the error of a step above. [-]"""
 LONGEST_RUN_IN_M = 100.0

@@ -80,7 +80,7 @@ class PullOut:
         current: Sequence[float] | np.ndarray | Current | None = None,
         start: float | Equilibrium = 0.0,
     ) -> PullOut:
-        """Return the task of `cable.pull_out`, with what is not given filled in.
+        """Return the task of `cable.pull_out`, with defaults filled in.
 
         Raises:
             subzero.UserError: what makes no sense by itself.
@@ -151,7 +151,7 @@ class Tow:
         current: Sequence[float] | np.ndarray | Current | None = None,
         drogue_drag_area: float = 0.0,
     ) -> Tow:
-        """Return the task of `cable.tow`, with what is not given filled in.
+        """Return the task of `cable.tow`, with defaults filled in.
 
         Raises:
             subzero.UserError: what makes no sense by itself.

@@ -1,4 +1,4 @@
-"""The ways of a cable's ends, sampled from their velocities, and whether there is room to follow them.
+"""The ways of a cable's ends, sampled from their velocities, and whether there is memory to follow them.
 
 Every scheme samples its paths here, so all of them run the same way.
 """
@@ -112,7 +112,9 @@ def check_memory(rows: int, segments: int) -> None:
 def _three_numbers(
     values: Sequence[Sequence[float] | np.ndarray], name: str, moments: np.ndarray
 ) -> np.ndarray:
-    """Return velocities as an array (times, 3) of finite numbers, or say what is wrong with the first that is none."""
+    """Return velocities as an array (times, 3); if one is not three finite numbers, raise an error that says what is
+    wrong.
+    """
     try:
         array = np.array(values)
         if array.shape == (moments.size, 3) and array.dtype.kind in "iuf" and np.isfinite(array).all():

@@ -24,7 +24,7 @@ NO_NUMBER = "this is not a finite number"
 
 
 class Checks:
-    """What is wrong with the fields of one value, collected and told together.
+    """Problems with the fields of one value, collected and reported together.
 
     Args:
         value: a frozen dataclass that is being made; a field that is right is replaced by its plain number or array.
@@ -124,7 +124,7 @@ class Checks:
         object.__setattr__(self._value, name, value)
 
     def freeze(self, name: str, array: np.ndarray) -> None:
-        """Keep an array as the field, so that nobody can change it unseen."""
+        """Keep a read-only copy of an array as the field."""
         array.setflags(write=False)
         self._keep(name, array)
 
@@ -143,7 +143,9 @@ class Checks:
             self._outside(f"{name}[{wrong[0]}]", float(values[wrong[0]]), quantity)
 
     def _array(self, name: str, shape: tuple[int | None, ...]) -> np.ndarray | None:
-        """Return a field as an array of finite numbers of a shape (None: any count above zero); note what is wrong."""
+        """Return a field as an array of finite numbers of a shape (None: any count above zero); note the problems
+        found.
+        """
         given = getattr(self._value, name)
         words = " × ".join("samples" if n is None else str(n) for n in shape)
         try:

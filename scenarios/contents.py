@@ -1,4 +1,4 @@
-"""What a trial, a vehicle or a cable says, number by number: value, unit, what is plausible, and where it comes from.
+"""The contents of a trial, a vehicle or a cable, number by number: value, unit, plausible range, and source.
 
 For people who look before they run (`subzero show`). A trial's numbers come with the limits and the meaning of the
 table of quantities; those of a vehicle or a cable with the range and the source that their own file gives.

@@ -62,7 +62,7 @@ def with_parameters(trial: Trial, values: Mapping[str, float]) -> Trial:
     """Return a trial with other values for some of its numbers.
 
     Args:
-        trial: what is changed; it stays as it is.
+            trial: the trial to change; it is not modified.
         values: dotted name → value, in the units of the files.
 
     Raises:
@@ -150,7 +150,7 @@ def parameter_values(trial: Trial, name: str) -> list[float]:
 
 
 def quantity_of(trial: Trial, name: str) -> Row:
-    """Return what is known of a number: a row of the table of quantities, or a leaf of the pattern of a part.
+    """Return the row of the table of quantities for a number, or the leaf of the pattern of a part.
 
     Raises:
         ScenarioError: the trial has no such number.
@@ -198,10 +198,11 @@ def part_file(trial: Trial, kind: str) -> Source:
 
 
 def with_vehicle(trial: Trial, named: str | Path) -> tuple[Trial, Source]:
-    """Return a trial with another vehicle, and the file of that; single values that the trial changes stay changed.
+    """Return a trial with another vehicle, and the file of that vehicle; single values changed by the trial remain
+    changed.
 
     Args:
-        trial: what is changed; it stays as it is.
+            trial: the trial to change; it is not modified.
         named: a vehicle that we ship, or the path of a file, from the working directory.
 
     Raises:
@@ -241,7 +242,7 @@ def _source_of(trial: Trial) -> Source:
     return Source(name=trial.source, folder=Path(trial.source).parent, text=trial.text, table=table, lines={})
 
 
-# What there is, and what is wrong with a name or a value.
+# The names that exist, and the problems of a name or a value.
 
 Row = Quantity | Leaf
 """What is known of a number: its limits, its unit."""
@@ -283,7 +284,7 @@ def _row(trial: Trial, name: str) -> tuple[Row, int] | None:
 
 
 def _problem(trial: Trial, name: str, value: object) -> Problem | None:
-    """Return what is wrong with a name or its value; None if nothing is."""
+    """Return the problem with a name or its value; None if there is none."""
     found, at = _row(trial, _list_of(name)), _at(name)
     if found is None or (at is not None and at >= found[1]) or ("[" in name and at is None):
         return _unknown(trial, name)

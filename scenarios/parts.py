@@ -1,10 +1,10 @@
 """Vehicle and cable files: every number with its unit, its plausible range, and where it comes from.
 
 A number is an inline table ``{ value = 6.6, unit = "kg", range = [6.4, 7.5], source = "..." }``. The first
-file we ship of each kind is its *pattern*: a user's file must have the same sections, keys and units; only what is
-`OPTIONAL` may be missing. ``range`` says what is plausible: readers, sweeps and calibrations
-go by it. ``tolerance``, which may be left out, says how far a healthy vehicle may be from the value (one standard
-deviation): diagnoses go by it. ``limits`` in the pattern says what is possible, and is enforced.
+file we ship of each kind is its *pattern*: a user's file must have the same sections, keys and units; only entries
+that are `OPTIONAL` may be missing. ``range`` gives the plausible values, which readers, sweeps and calibrations
+use. ``tolerance``, which may be left out, says how far a healthy vehicle may be from the value (one standard
+deviation); diagnoses use it. ``limits`` in the pattern gives the possible values, and is enforced.
 
 The section [changes] of a trial gives single values that differ from these files:
 

@@ -19,7 +19,7 @@ INNER = {"degree": math.pi / 180.0, "degree/s": math.pi / 180.0}
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """One number: its name in files, its unit there, and what is allowed.
+    """One number: its name in files, its unit there, and its limits.
 
     Attributes:
         name: name of the key or of the column, with its unit.

@@ -51,7 +51,7 @@ Read = tuple[dict[str, Any], list[Problem]]
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """A trial file while it is read: what it says, and what is wrong so far."""
+    """A trial file while it is read: its contents, and the problems found so far."""
 
     source: Source
     problems: list[Problem] = field(default_factory=list)
@@ -130,7 +130,7 @@ def load(
 
 
 def _in_order(problems: list[Problem]) -> list[Problem]:
-    """Sort problems by line within each file; files stay in the order in which they were read."""
+    """Sort problems by line within each file; files keep the order in which they were read."""
     files = list(dict.fromkeys(problem.file for problem in problems))
     return sorted(problems, key=lambda problem: (files.index(problem.file), problem.line or 0))
 
@@ -177,7 +177,8 @@ def _complaint(reading: Reading, part: Part, changed: Mapping[str, float], said:
 
 
 def check_trim(source: Source, start: Mapping[str, Any]) -> list[Problem]:
-    """Return what [start] says beside at_trim, though that finds it, or does not say, though that needs it."""
+    """Return keys of [start] that at_trim determines and that are given, or that at_trim needs and that are missing.
+    """
     table = source.table.get("start", {})
     if not start.get("at_trim", False) or not isinstance(table, Mapping):
         return []
@@ -248,7 +249,7 @@ def _vectors(lists: Mapping[str, list[float]], names: list[str], count: int) -> 
 
 
 def _read_water(source: Source) -> Read:
-    """Return the uniform current, and what is added to it by depth."""
+    """Return the uniform current, and the profile that is added to it by depth."""
     values, problems = check_section(source, "water", source.table.get("water", {}))
     current = tuple(float(values.get(name, 0.0)) for name in CURRENT)
     fields = {"current": current, "sea_bed": float(values.get("sea_bed_m", 0.0))}
@@ -274,7 +275,7 @@ def _check_profile(source: Source, lists: Mapping[str, list[float]]) -> list[Pro
         return [source.problem("water.depth_m", why, "Add profile_north_m_s, profile_east_m_s, or both.")]
     depth = lists.get("depth_m")
     if depth is None:
-        return []  # its own problem has been told
+        return []  # a problem of its own has been reported
     problems = [
         source.problem(
             f"water.{name}",

@@ -1,4 +1,4 @@
-"""What a vehicle is told, as it stands in files: columns of numbers over time, inline in the trial or in a CSV file.
+"""The instructions of a vehicle in files: columns of numbers over time, inline in the trial or in a CSV file.
 
 Inline lists are *switch points*: the last value holds to the end of the run. The rows of a CSV file are *samples of
 a log*: a row of a file holds until the next, the last one for one sampling interval more, at most 1 s (`LONGEST_HOLD`).
@@ -155,7 +155,9 @@ def _check_kinds(source: Source, kinds: list[str], given: Given) -> list[Problem
 
 
 def _check_start(source: Source, samples: Samples | None) -> list[Problem]:
-    """Return what [start] says beside a prescribed motion, though the motion says it already, or has no actuators."""
+    """Return keys of [start] that are not allowed with a prescribed motion: the motion gives them, or has no
+    actuators.
+    """
     start = source.table.get("start", {})
     why, remedy = "the prescribed motion says how the run starts", "Leave it out, and set it in [motion]."
     known = {quantity.name for quantity in START} | {"at_trim"}
@@ -240,7 +242,7 @@ def check_motion(samples: Samples) -> list[Problem]:
 
 
 def _check_smooth(samples: Samples, duration: float | None) -> list[Problem]:
-    """Return what is not known of a smooth motion: a gap, and what comes behind its last sample."""
+    """Return the problems of a smooth motion where it is not known: at a gap, and after its last sample."""
     time = np.asarray(samples.time, dtype=float)
     at = gap_at(time)
     problems = [] if at is None else [samples.problem(at, *gap_in_words(time, at))]

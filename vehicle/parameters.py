@@ -3,7 +3,7 @@
 Every number of a vehicle is a field of a frozen dataclass, a `Section`, made by `parameter`: it carries its meaning,
 its unit and its hard limits (outside of which the equations make no sense; plausible ranges and provenance live
 with the values, in the vehicle's file). A section checks its numbers when it is made; `read_section` turns a plain
-mapping into one and collects what is wrong instead of stopping at the first mistake.
+mapping into one and collects all problems instead of stopping at the first.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from subzero.errors import UserError, real, short
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Problem:
-    """One thing wrong with the numbers of a vehicle: which key, what was found, why not, what is allowed."""
+    """One problem with the numbers of a vehicle: the key, the value found, the reason, the values allowed."""
 
     key: str
     found: str
@@ -113,7 +113,7 @@ def is_plainly_right(value: object, field: dataclasses.Field[Any]) -> bool:
 
 
 def check_value(key: str, value: object, field: dataclasses.Field[Any]) -> Problem | None:
-    """Return what is wrong with one value, or None."""
+    """Return the problem with one value, or None."""
     low, high, strict = (field.metadata[name] for name in ("low", "high", "strict"))
     if type(value) is float and low < value < high:
         return None
@@ -141,7 +141,7 @@ def read_section(kind: type, section: str, values: object, problems: list[Proble
     """Make one section of a vehicle from a mapping; append to `problems`, and return None, if that fails."""
     fields = _fields(kind)
     if isinstance(values, Mapping) and values.keys() == fields.keys():
-        with suppress(VehicleError):  # then each problem is told below, by its name in the file
+        with suppress(VehicleError):  # then each problem is reported below, by its name in the file
             return kind(**values)
     if not isinstance(values, Mapping):
         allowed = "a table with " + ", ".join(fields)

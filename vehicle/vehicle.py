@@ -232,7 +232,7 @@ def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
 
 
 def inconsistencies(hull: Hull, added_mass: AddedMass) -> list[Problem]:
-    """Return what is wrong between numbers that are right by themselves."""
+    """Return the inconsistencies between numbers that are valid by themselves."""
     problems = []
     if hull.nose_length + hull.tail_length > hull.length:
         parts = f"nose {hull.nose_length:g} m and tail {hull.tail_length:g} m"

@@ -103,7 +103,7 @@ def _remedy(scheme: Paper) -> str:
 
 
 class Fixed(NamedTuple):
-    """What stays what it is during a run in boxes: segment length [m], constants of (7), the drum."""
+    """Constants of a run in boxes: segment length [m], constants of (7), the drum."""
 
     segment_length: float
     cable: Equation7Numbers

@@ -73,7 +73,8 @@ def rope_off_drum(
     wet: float,
     ahead: np.ndarray,
 ) -> Rope:
-    """Return a rope laid straight from the drum to where a course begins, with room for all that comes off on its way.
+    """Return a rope laid straight from the drum to the start of a course, with space for all the cable paid out on
+    the way.
 
     Args:
         course: of the tow point, which begins `wet` ahead of the drum.
@@ -159,7 +160,7 @@ MOST_HALVINGS = 12
 
 
 FULL = -1
-"""In place of the worst equation of a step: no room for more cable."""
+"""Returned in place of the worst equation of a step: no space for more cable."""
 
 
 class Course(NamedTuple):
@@ -177,7 +178,7 @@ class Course(NamedTuple):
 
 
 class Fixed(NamedTuple):
-    """What stays what it is during a run, in the order in which `take_step` takes it."""
+    """Constants of a run, in the order of the arguments of `take_step`."""
 
     cable: CableNumbers
     drum: DrumNumbers

@@ -1,4 +1,4 @@
-"""The lumped cable as arrays: nodes with half of the mass of the segments beside them, springs between.
+"""The lumped cable as arrays: nodes with half of the mass of the two adjacent segments, springs between them.
 
 Nodes run from the tow point (0) to the drum (count). Nodes 1 … count−1 are material points that move freely; node count
 is where the cable leaves the drum, or a free tail. Spring j joins nodes j−1 and j; the last one gets longer and shorter
@@ -26,7 +26,7 @@ STATE, REST, SIZE, PULL, GAIN, GAP, SLOPE, START_STRETCHED, STRETCHED_RATE = ran
 what the stage builds on for L [m], dL/dt at level OLD [m/s]."""
 MOMENTUM_RATE, START_POSITION, START_MOMENTUM, WATER, THINNING, DIRECTION, ANSWER = range(7)
 """Vectors of a node: dp/dt of the lump at level OLD [N], what the stage builds on for position [m] and momentum
-[kg m/s], J [m/s], ∂R/∂T of its balance by the tensions beside it through √(1+eT); of a spring: t and
+[kg m/s], J [m/s], ∂R/∂T of its balance by the tensions of the adjacent springs through √(1+eT); of a spring: t and
 ∂L/∂(V_j − V_{j−1}) [s]."""
 FADING = 0.5
 """τ. [s]"""
@@ -83,7 +83,7 @@ class RopeEnds(Record):
 
 
 class Rope(NamedTuple):
-    """The state of a lumped cable and the room to advance it; entry 0 of what springs have is unused.
+    """The state of a lumped cable and the work space to advance it; entry 0 of arrays over springs is unused.
 
     Attributes:
         ends: what there is once.
@@ -110,7 +110,7 @@ class Rope(NamedTuple):
 
 
 def new_rope(capacity: int) -> Rope:
-    """Return an empty rope with room for `capacity` springs."""
+    """Return an empty rope with space for `capacity` springs."""
     n = capacity + 2
     ends = RopeEnds(
         count=1,

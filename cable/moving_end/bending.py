@@ -6,8 +6,8 @@ The bending energy of a chain of straight segments with tangents t_j, and the sh
 
 with ℓ̄_j = ½(ℓ_j + ℓ_{j+1}) and no moment at the two ends (hinges at the vehicle and at the drum; a layer of thickness
 √(EI/T) at a clamped end is not modelled). f_j of `assembly` becomes T_j t_j − q_j; for a gently bent cable q is
-EI ∂³x/∂s³. It depends on four nodes, so a balance depends on five: the matrix gets blocks beside its three diagonals.
-ℓ̄ of the growing segment is taken from the step before. A cable without EI compiles nothing of this.
+EI ∂³x/∂s³. It depends on four nodes, so a balance depends on five: the matrix gets two blocks more than its three
+diagonals. ℓ̄ of the growing segment is taken from the step before. A cable without EI compiles nothing of this.
 
 What it does not do: a cable cannot be pushed here (`slack_law`), stiff or not. Where a winch pays out more than is
 taken, while less is in the water than the length (EI/w_c)^⅓ in which weight begins to bend it, a stiff cable would

@@ -1,4 +1,4 @@
-"""The drum's equation (11), the last row of a step, and the cable that lies loose before a drum that runs ahead.
+"""The drum's equation (11), the last row of a step, and the loose cable in front of a drum that overruns.
 
 The drum gives cable at the rate U_d, the water takes it at U = dℓ_N/dt, and L = ∫(U_d − U) dt lies loose:
 
@@ -9,7 +9,7 @@ The drum gives cable at the rate U_d, the water takes it at U = dℓ_N/dt, and L
 Where L = 0 for some steps, rates are differenced as all others, and U_d = U. Else to first order, with U_d from the
 lengths of two levels: the step in which L runs out takes U_d part of the way from the drum's speed to that of the
 cable, the next one the rest, and the impulse is (I_d/R_d²) ΔU_d. Differences of second order overshoot at that corner.
-A cable of one segment leaves no room for that: its drum gives what the chord asks for (`assembly`).
+This is not possible with a cable of one segment: its drum gives the length that the chord requires (`assembly`).
 """
 
 from __future__ import annotations

@@ -315,7 +315,7 @@ def _step_from_rest(
 
 @inner
 def _guess(line: Line, water: Water, work: Load) -> None:
-    """Fill level NEW with the present one, and what is held while a step is solved."""
+    """Fill level NEW with the present level, and the water and the arc corrections that a step keeps fixed."""
     for j in range(line.ends.count + 1):
         line.tension[NEW, j] = line.tension[NOW, j]
         for i in range(3):

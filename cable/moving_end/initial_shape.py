@@ -25,7 +25,7 @@ def lay_straight(
     The cable is as long as `wet_length` says, in segments of `spacing`, those far from both ends as long as
     `remeshing.join_far` would make them; it comes off the drum as fast as the tow point
     moves away, and its tension is that of a steady straight pull with none at the drum, so a run can start at speed
-    without a jolt. Needs 0 < wet_length and room.
+    without a jolt. Requires 0 < wet_length and a line with enough capacity.
     """
     ends, away = line.ends, 0.0
     ends.count, ends.settled, ends.time, ends.previous_step = 1, 0.0, 0.0, 0.0
@@ -83,10 +83,11 @@ def _pull_straight(
 
 
 def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, payout: float) -> None:
-    """Lay a line as it hangs, at all levels of time: at rest, or carried along by ends that move at `tow` and `drum`.
+    """Lay a line in an equilibrium shape, at all levels of time: at rest, or moving with ends at velocity `tow` and
+    `drum`.
 
     Args:
-        line: with room for its segments; filled, relative to the second end.
+            line: with space for its segments; filled, relative to the second end.
         held: the equilibrium.
         tow: velocity of its first end (3,); even along the cable to the other. [m/s]
         drum: velocity of its second end (3,). [m/s]

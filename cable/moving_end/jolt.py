@@ -1,12 +1,12 @@
-"""A tow point that changes its velocity at once: an impulse along the whole cable, taken apart from the steps of time.
+"""A tow point that changes its velocity at once: an impulse along the whole cable, separate from the time steps.
 
 A cable that does not stretch has to follow at once. With ΔV the jump of the velocity of a node, τ the impulse of the
 tension in a segment and ΔP = ℓ (m ΔV + ρA ΔV_⊥) that of its momentum,
 
     τ_j t_j − τ_{j+1} t_{j+1} + ½(ΔP_j + ΔP_{j+1}) = 0,     (ΔV_j − ΔV_{j−1})·t_j = 0
 
-the equations of `assembly` in an infinitely short step: drag and weight have no part in it, places stay as they
-are. A step of time that spreads this impulse over its length shows a peak, or a dip, of the tension that grows
+the equations of `assembly` in an infinitely short step: drag and weight have no part in it, positions do not
+change. A time step that spreads this impulse over its length shows a peak, or a dip, of the tension that grows
 without bound as the step gets shorter, and rings after it.
 
 An impulse that pushes is a cable that gets slack for the time in which drag slows it down, −τ/T: 2 ms where the

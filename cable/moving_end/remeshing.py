@@ -61,9 +61,9 @@ def split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) -
     """Insert a node `segment_length` from the start of the last segment, on its chord, at levels NOW and BEFORE.
 
     The new node is a material point. At level BEFORE it may still have been on the drum: then it is put where the
-    straight continuation of the chord would have had it, so that its backward differences stay smooth. Where little or
-    nothing of the last segment was out of the drum then, the segment before it is continued: a step may pay out several
-    segments, or one exactly.
+    straight continuation of the chord would have had it, so that its backward differences remain smooth. Where little
+    or nothing of the last segment was out of the drum then, the segment before it is continued: a step may pay out
+    several segments, or one exactly.
     """
     N = line.ends.count
     for level in (NOW, BEFORE):
@@ -145,8 +145,8 @@ def join_far(line: Line, c: CableNumbers, work: Load) -> None:
     """Join pairs of segments far from both ends to one, where the cable is taut and nearly straight.
 
     b metres beyond `far_length` from the nearer end, a segment may be Δs + g s + g₁ b long, up to `LONGEST` more. The
-    ends stay fine: there a cable bends, the vehicle by its turns, a current or the cable's weight beside the drum,
-    where it hardly pulls.
+    ends keep short segments: there a cable bends, near the vehicle in its turns, and near the drum, where it hardly
+    pulls, by a current or its own weight.
     """
     ends, layout, along, j = line.ends, line.ends.layout, 0.0, 1
     while j < ends.count - 1:

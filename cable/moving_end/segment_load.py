@@ -27,7 +27,7 @@ from subzero.jit import Record, inlined, inner, made_once
 
 
 class Load(Record):
-    """Work space for one segment: what is known of it, its load q, and derivatives.
+    """Work space for one segment: its geometry, its load q, and derivatives.
 
     Attributes:
         velocity, water, chord: V of the segment's middle, J there, and d (3,).
@@ -87,8 +87,8 @@ def evaluate_momentum(c: CableNumbers, work: Load) -> None:
 def measured_chord(x: np.ndarray, j: int, length: float) -> tuple[float, float, float]:
     """Return |d|²/ℓ² [-], r [m] and 1/r [1/m] of segment j, given the nodes at one level (nodes, 3), see `slack_law`.
 
-    Whoever goes along a cable measures the next chord before it works on this one: a processor does the root and the
-    quotients, which wait for one another, beside that.
+    A loop along the cable measures the next chord before it works on the present one: the processor then computes the
+    root and the quotients, which depend on one another, in parallel with that work.
     """
     a, b, d = x[j, 0] - x[j - 1, 0], x[j, 1] - x[j - 1, 1], x[j, 2] - x[j - 1, 2]
     square = (a * a + b * b + d * d) / (length * length)

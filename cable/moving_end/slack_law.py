@@ -38,8 +38,8 @@ FOLDING = 0.3
 @inlined
 def slack_law(T: float, shortening: float, smoothing: float) -> tuple[float, float, float]:
     """Return φ and its derivatives by the tension T [N] and the shortening σ [-], for T₀ = `smoothing` [N]."""
-    # φ = 0 says a b = μ with a, b ≥ 0. Newton's method likes its slopes: a taut segment has ∂φ/∂T ≈ 0 and a row that
-    # says σ = 0, a slack one ∂φ/∂σ ≈ 0 and a row that says T = 0, and nobody has to guess which of the two it is.
+    # φ = 0 says a b = μ with a, b ≥ 0. It suits Newton's method: a taut segment has ∂φ/∂T ≈ 0 and a row that says
+    # σ = 0, a slack one ∂φ/∂σ ≈ 0 and a row that says T = 0, so it is not necessary to guess which of the two it is.
     a, b = T / TENSION_SCALE, shortening / STRAIN_SCALE
     mu = smoothing / (TENSION_SCALE * STRAIN_SCALE)
     s = sqrt(a * a + b * b + 2.0 * mu)

@@ -33,13 +33,13 @@ propeller speeds, three steps), which goes slack for a moment, all are solved wi
 
 
 class Layout(Record):
-    """How a cable is divided, and what its far end is: chosen at the start.
+    """How a cable is divided into segments, and the kind of its far end; chosen at the start.
 
     Attributes:
         segment_length, grading: new segments are `segment_length` + `grading` s long, s from the tow point. [m], [-]
         far_length, far_grading: farther than this from both ends, segments are joined to longer ones, by so much per
             metre (`remeshing.join_far`); 0: none are. [m], [-]
-        run_in: length L₀ beside the tow point in which segments are shorter (`spacing`), 0 for none. [m]
+            run_in: length L₀ from the tow point in which segments are shorter (`spacing`), 0 for none. [m]
         free_end: whether the far end is a free tail instead of the drum.
         tail_drag: ½ρC_dA of a drogue there. [kg/m]
     """
@@ -163,8 +163,8 @@ class Line(NamedTuple):
         forcing: a further force per length on segment j at level NEW (nodes, 3), for made-up solutions. [N/m]
         slip, normal_gain: corrections for the arc that a segment stands for (nodes,), see `chord_correction`. [m/s, 1]
         load: ∫(∂p/∂t + D − w_c k) ds of the segments at level NEW (nodes, 3). [N]
-        blocks: of the Newton matrix (5, nodes, 4, 4): `LOWER`, `DIAGONAL`, `UPPER`, see `block_solver`; beside them
-            `LOWER2` and `UPPER2` of a cable with bending stiffness, see `block_solver`.
+            blocks: of the Newton matrix (5, nodes, 4, 4): `LOWER`, `DIAGONAL`, `UPPER`, and for a cable with bending
+                stiffness `LOWER2` and `UPPER2`, see `block_solver`.
         pivots: of the factored blocks (nodes, 4).
         rows: residual, guess and Newton step of the unknowns (3, nodes, 4).
     """
@@ -193,7 +193,7 @@ LOWER, DIAGONAL, UPPER, LOWER2, UPPER2 = range(5)
 
 
 def new_line(capacity: int) -> Line:
-    """Return an empty line with room for `capacity` segments."""
+    """Return an empty line with space for `capacity` segments."""
     return Line(ends=_new_ends(), **_per_node(capacity + 1))
 
 
@@ -247,7 +247,7 @@ def _per_node(n: int) -> dict[str, Any]:
 
 
 def enlarged(line: Line, capacity: int) -> Line:
-    """Return the same line with room for `capacity` segments."""
+    """Return the same line with space for `capacity` segments."""
     larger = _per_node(capacity + 1)
     for name, new in larger.items():
         old = getattr(line, name)

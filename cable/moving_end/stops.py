@@ -20,7 +20,7 @@ EQUATIONS = ("length", "northward balance", "eastward balance", "downward balanc
 NEARLY_TAUT = 0.999
 """A cable whose ends are this share of its length apart, or more, and that has no solution, is too short."""
 SHORT_SEGMENTS = 3.0
-"""A cable of fewer segments than this has hardly begun."""
+"""A cable of fewer segments than this has hardly left the drum."""
 
 
 class Names(NamedTuple):

@@ -6,7 +6,7 @@ Where an error is allowed (`rtol`), it is estimated, and the next step is the on
 backward difference of second order errs by h(h + h')/6 x‴ in the velocity V, that is by h(h + h')/6 V̈. The tow force
 goes about with the square of the velocity, so it errs by h(h + h')/6 F̈ or so, while the force that is extrapolated
 from the two steps before is off by h(h + h')/2 F̈. A third of that gap, as a share of the largest force so far, is
-what is taken for the error.
+the error estimate.
 """
 
 from __future__ import annotations
@@ -54,7 +54,8 @@ MOST_CUTS = 6
 """A step that errs too much is made smaller by this many halvings at most, and so are those behind it: a jolt has no
 accurate step, and in ever smaller ones it only rings louder."""
 FIRST_STEP = 0.1
-"""With an error allowed, a run begins, and goes on after a jolt, with this share of a row: it cannot tell its error."""
+"""With `rtol` given, the first step of a run, or after a jolt, is this share of a row, as it has no error
+estimate."""
 
 
 class Record(NamedTuple):
@@ -87,7 +88,7 @@ class Record(NamedTuple):
 
 
 def new_record(rows: int, capacity: int) -> Record:
-    """Return an empty record with room for `rows` rows and a line that grows to `capacity` segments."""
+    """Return an empty record with space for `rows` rows and a line that grows to `capacity` segments."""
     nodes = rows * (capacity + 2)
     per_row = {name: np.zeros(rows) for name in ("tow_tension", "drum_tension", "length", "courant")}
     counts = {name: np.zeros(rows, np.int64) for name in ("segments", "iterations", "steps")}
@@ -128,7 +129,7 @@ def follow_path(
         record: filled from row 0 on, the start.
 
     Returns:
-        how many rows are filled: all, unless it failed; `line.ends.solved` tells how the last step was solved.
+            the number of filled rows: all, unless it failed; `line.ends.solved` holds how the last step was solved.
     """
     rows, used = path.times.size, line.ends.count + 1
     suggested = FIRST_STEP * (path.times[1] - path.times[0])
@@ -266,10 +267,11 @@ def led_drum(task: PullOut, times: np.ndarray) -> np.ndarray:
 
 
 def _capacity(task: PullOut, path: TowPath, led: np.ndarray, segment_length: float, scheme: MovingEnd) -> int:
-    """Return for how many segments there has to be room; refuse what does not fit into memory.
+    """Return the number of segments to allocate; raise an error if they do not fit into memory.
 
-    A winch says how much cable there will be. A free drum gives what the ways of both ends and the current ask for, and
-    some of its own accord; room is made for three times their sum and 5 m more, and `stops` tells where that ends.
+    For a winch the longest cable is known. A free drum gives the cable that the ways of both ends and the current
+    require, and some by its own motion; space is allocated for three times their sum and 5 m more, and `stops`
+    reports where that is exceeded.
     """
     if isinstance(task.drum, PayOutRate | Brake):
         longest = float(led[:, SETPOINT].max())
@@ -338,7 +340,7 @@ LARGEST_GROWTH, LARGEST_CUT = 2.0, 0.2
 
 @inner
 def estimate_error(line: Line, step: float) -> float:
-    """Return the relative error of the tow force on level NEW; 0 when there is no history to tell. [-]."""
+    """Return the relative error of the tow force on level NEW; 0 when there are too few steps to estimate it. [-]."""
     if line.ends.previous_step <= 0.0:
         return 0.0
     ratio, F, past = step / line.ends.previous_step, line.ends.tow.force, line.ends.tow.past

@@ -75,7 +75,7 @@ def try_step(
     Return whether there is a solution; `line.ends.solved` says how it was found.
 
     Args:
-        line: the cable; levels NOW and BEFORE stay untouched.
+            line: the cable; levels NOW and BEFORE are not changed.
         step: Δt. [s]
         tow: position of the tow point at the new time, earth axes (3,). [m]
         water: how the water moves.
@@ -123,8 +123,8 @@ def _solve_softly(
     work: Load,
     again: bool,
 ) -> bool:
-    """Solve from the answer to a tow point close by, if there is one; else, or if that leads astray, from a prediction;
-    if that fails, with a slack law that is made sharp little by little.
+    """Solve from the solution for a tow point close by, if there is one; if there is none, or if Newton's method does
+    not converge from it, solve from a prediction; if that fails, with a slack law that is sharpened in stages.
     """
     w = backward_weights(step, line.ends.previous_step)
     if (
@@ -158,7 +158,7 @@ def _solve_softly(
 def _predict(
     line: Line, step: float, tow: np.ndarray, water: Water, c: CableNumbers, drum: DrumNumbers, work: Load
 ) -> None:
-    """Guess level NEW: everything goes on as it moves, tensions stay; and what is held at its prediction."""
+    """Predict level NEW by extrapolation, and fill the quantities that are fixed while a step is solved."""
     N, held = line.ends.count, held_node(line)
     ratio = step / line.ends.previous_step if line.ends.previous_step > 0.0 else 0.0
     for j in range(N + 1):
@@ -194,12 +194,13 @@ def solve_step(
     work: Load,
     near: bool,
 ) -> bool:
-    """Solve the equations of `assembly` for level NEW, from the guess that stands there; return whether that went well,
-    and leave in `line.ends.solved` how. One that is as `near` as that
-    of `follow_tow` is likely to be right: no matrix is made until the residual says that it is not.
+    """Solve the equations of `assembly` for level NEW, from the guess in it; return whether the iteration converged,
+    and report in `line.ends.solved` how. A guess as `near` as that of `follow_tow` is likely to be right: no matrix
+    is made unless the residual shows that it is not.
 
-    The matrix is made anew for every step: a kept one converges to the tolerance only, and what is left then differs
-    from run to run, which sensitivities by differences see. Whether a guess will do, the residual tells by itself.
+    The matrix is computed for every step: a kept one converges to the tolerance only, and the remaining error then
+    differs from run to run, which shows in sensitivities by differences. The residual alone shows whether a guess is
+    good enough.
     """
     rounding, alone = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0, has_residual(line, c)
     made = not near
@@ -231,7 +232,7 @@ def solve_step(
 
 @compiled
 def _residual(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load, alone: bool) -> None:
-    """Fill the residual: `alone`, so that the factors of the last matrix stay, or with the matrix."""
+    """Fill the residual: `alone`, so that the factors of the last matrix are kept, or with the matrix."""
     if alone:
         assemble_residual(line, w, c, drum, work)
     else:
@@ -315,7 +316,7 @@ def _failed(line: Line, rounding: float) -> bool:
     solved = line.ends.solved
     solved.converged, solved.iterations, solved.residual = False, MAX_ITERATIONS, worst
     solved.worst_node, solved.worst_equation = node, equation
-    line.ends.solver.factored = False  # of a matrix that led astray
+    line.ends.solver.factored = False  # the matrix belongs to an iteration that did not converge
     return False
 
 
