@@ -1,6 +1,6 @@
 """Reasons why the numbers of a cable may be wrong; runs of a cable alone and trials with a vehicle share them.
 
-        energy      residual of the balance of work and losses, as a share of them
+    energy      residual of the balance of work and losses, as a share of them
     roughness   |F(t−h) − 2F(t) + F(t+h)| / max |F|: a tow force that jumps from sample to sample is not resolved
     slack       cable that is longer than the way between its nodes, or pulls at neither end of a segment
     surface     cable above down = 0 and above its ends: in the air, if down is depth
@@ -93,7 +93,7 @@ def doubts_of(
         length: of the cable (samples,). [m]
         shapes: node positions, an array (nodes, 3) a sample. [m]
         tensions: at the nodes, an array (nodes,) a sample. [N]
-            energy_residual: residual of the energy balance; NaN where no energies are recorded. [-]
+        energy_residual: residual of the energy balance; NaN where no energies are recorded. [-]
     """
     found = []
     if energy_residual > RESIDUAL:

@@ -55,7 +55,7 @@ class DrumNumbers(Record):
         inertia: I_d/R_d². [kg]
         friction: C_f/R_d. [N]
         control: who decides on the pay-out, `FREE`, `LENGTH` or `TENSION`.
-            setpoint: commanded value at the new time: length [m] or tension [N]; without meaning for a free drum.
+        setpoint: commanded value at the new time: length [m] or tension [N]; without meaning for a free drum.
         place, velocity: of the drum at the new time, relative to its place at the start (3,). [m], [m/s]
     """
 

@@ -46,8 +46,8 @@ class Outcome:
         worst_residual: residual left in the last step, as a multiple of its tolerance.
         steps: how many steps were taken, with those that were made smaller than the time between two results.
         largest_courant_number: √(T/m1) Δt/Δs, how many segments a transverse wave crosses in a step, at most.
-            energy_residual: residual of the balance of `moving_end.energy`, as a share of the total of the work and
-                the loss.
+        energy_residual: residual of the balance of `moving_end.energy`, as a share of the total of the work and the
+            loss.
     """
 
     completed: bool

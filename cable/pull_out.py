@@ -108,10 +108,9 @@ def pull_out(
         the history from t = 0 on. Look at `history.outcome`: a run that could not go on keeps what it has.
 
     Raises:
-            subzero.UserError: a duration that is not positive, an unknown scheme or one that does not support a given
-                option, a tow velocity or current that is not three finite numbers, a run that does not fit into
-                memory. (Bad
-            values are a ValueError, too.)
+        subzero.UserError: a duration that is not positive, an unknown scheme or one that does not support a given
+            option, a tow velocity or current that is not three finite numbers, a run that does not fit into memory.
+            (Bad values are a ValueError, too.)
     """
     row, options = _chosen(scheme)
     task = PullOut.of(tow_velocity, duration, cable=cable, drum=drum, current=current, start=start)

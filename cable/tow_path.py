@@ -112,9 +112,7 @@ def check_memory(rows: int, segments: int) -> None:
 def _three_numbers(
     values: Sequence[Sequence[float] | np.ndarray], name: str, moments: np.ndarray
 ) -> np.ndarray:
-    """Return velocities as an array (times, 3); if one is not three finite numbers, raise an error that says what is
-    wrong.
-    """
+    """Return velocities as an array (times, 3); report the first that is not three finite numbers in an error."""
     try:
         array = np.array(values)
         if array.shape == (moments.size, 3) and array.dtype.kind in "iuf" and np.isfinite(array).all():

@@ -24,8 +24,8 @@ class Problem:
         line: line in the file, from 1; None where the whole file is meant.
         key: key or column, such as ``run.hull_step_s``; empty where none is meant.
         found: the value found, as text; empty where something is missing.
-            why: the reason.
-            remedy: the allowed values, or the nearest valid name.
+        why: the reason.
+        remedy: the allowed values, or the nearest valid name.
     """
 
     file: str

@@ -88,7 +88,7 @@ class Motion:
         sway_speed: v, to starboard; None if it is not known, as all that follow. Shape (samples,). [m/s]
         heave_speed: w, along the body's down axis. Shape (samples,). [m/s]
         roll: φ, positive starboard side down. Shape (samples,). [rad]
-            roll_rate: p; only together with a roll. Shape (samples,). [rad/s]
+        roll_rate: p; only together with a roll. Shape (samples,). [rad/s]
         pitch_rate: q. Shape (samples,). [rad/s]
         yaw_rate: r. Shape (samples,). [rad/s]
         north: place of the hull centre. Shape (samples,). [m]

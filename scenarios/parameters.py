@@ -62,7 +62,7 @@ def with_parameters(trial: Trial, values: Mapping[str, float]) -> Trial:
     """Return a trial with other values for some of its numbers.
 
     Args:
-            trial: the trial to change; it is not modified.
+        trial: the trial to change; it is not modified.
         values: dotted name → value, in the units of the files.
 
     Raises:
@@ -202,7 +202,7 @@ def with_vehicle(trial: Trial, named: str | Path) -> tuple[Trial, Source]:
     changed.
 
     Args:
-            trial: the trial to change; it is not modified.
+        trial: the trial to change; it is not modified.
         named: a vehicle that we ship, or the path of a file, from the working directory.
 
     Raises:

@@ -177,7 +177,8 @@ def _complaint(reading: Reading, part: Part, changed: Mapping[str, float], said:
 
 
 def check_trim(source: Source, start: Mapping[str, Any]) -> list[Problem]:
-    """Return keys of [start] that at_trim determines and that are given, or that at_trim needs and that are missing.
+    """Return keys of [start] that at_trim determines and that are given, or that at_trim needs and that are
+    missing.
     """
     table = source.table.get("start", {})
     if not start.get("at_trim", False) or not isinstance(table, Mapping):

@@ -87,8 +87,8 @@ class Start:
         rudder_angle: where the rudder stands; a servo without lag and rate limit stands as commanded. [rad]
         stern_plane_port_angle: the same of the port stern-plane. [rad]
         stern_plane_starboard_angle: the same of the starboard stern-plane. [rad]
-            at_trim: begin in the steady level motion at this surge speed, depth and wet length, which determines the
-                pitch, the other speeds and the actuators that hold it; commands remain those of the trial.
+        at_trim: begin in the steady level motion at this surge speed, depth and wet length, which determines the
+            pitch, the other speeds and the actuators that hold it; commands remain those of the trial.
         wet_length: cable already in the water, laid straight behind the vehicle. [m]
         drum_north: where the drum is from the tow point, northwards: the cable then hangs at rest between them. [m]
         drum_east: the same, eastwards. [m]
@@ -270,11 +270,11 @@ class Trial:
         tolerances: dotted name of a number of vehicle, cable or drum → how far a healthy vehicle may be from it, of
             those whose file or trial says so; one standard deviation, in the number's unit.
         current: velocity of the water, north, east, down, the same everywhere. [m/s]
-            profile: velocity of the water that is added to it by depth.
+        profile: velocity of the water that is added to it by depth.
         sea_bed: depth of a flat sea bed, which a run that goes below it warns of; 0 is not known. [m]
         winch: what turns the drum; None for a free drum.
         vessel: how the drum moves; None for a drum on the shore.
-            commands: the commands to the actuators.
+        commands: the commands to the actuators.
         motion: the prescribed motion.
     """
 

@@ -5,8 +5,8 @@
 
     simulate("fig6", progress=[])   simulate: progress is []; it must be a function of 1 argument or None.
 
-The annotations say what is allowed; there is no other table. Whether a number is within its limits is for the function
-to say (`subzero.errors.checked`).
+The annotations define the allowed arguments; there is no other table. Whether a number is within its limits is
+checked by the function (`subzero.errors.checked`).
 
 Why no library: pydantic copies and converts what it checks; beartype looks at one item of a list, and at no signature
 of a callback; typeguard imports for 0.2 s, and refuses numpy's numbers and arrays. None knows names that a module

@@ -2,7 +2,7 @@
 
 A channel has one name everywhere: in the dataset (`surge_speed`), in a CSV file with its unit behind it
 (`surge_speed_m_s`), in a measured record, a figure, a report. Results carry the *display* unit of this table
-(degrees, rev/s), so what is read from a file is what is seen in a figure; ``scale`` leads there from SI.
+(degrees, rev/s), so the numbers in a file are those in a figure; ``scale`` converts to it from SI.
 
 Signs: axes are north-east-down for the earth and forward-starboard-down for the body. Depth is positive
 down, heading runs clockwise from north and is continuous (no jump at 360 degrees), a positive rudder
@@ -48,9 +48,10 @@ STANDARD_NAMES = {
 
 
 COLUMN_STEMS = {"roll_angle": "roll"}
-"""Channel → what its column is called before the unit, where that is not its name.
+"""Channel → name of its column without the unit, where that is not its own name.
 
-``run.roll`` is a method of xarray, so the variable is ``roll_angle``; the column ``roll_deg`` hides nothing, and stays.
+``run.roll`` is a method of xarray, so the variable is ``roll_angle``; the column ``roll_deg`` hides nothing, and is
+kept.
 """
 
 RENAMED_CHANNELS = {"roll": "roll_angle"}

@@ -1,4 +1,4 @@
-"""What a user can do wrong, told in one clean message (exit code 2 on the command line).
+"""Errors that a user can cause, each reported in one clean message (exit code 2 on the command line).
 
 A message has three parts: *what* was found (file, line or name, value), *why* it cannot be, and *what to do*.
 Only the command line catches `UserError`; anything else that is raised is a bug of ours and keeps its
@@ -40,7 +40,7 @@ class BadValueError(UserError, ValueError):
 
 
 def foreign_package() -> str:
-    """Return what is wrong where Python finds another package by the name of one of ours; empty if nothing is."""
+    """Return a message if Python finds another package by the name of one of ours; empty if it does not."""
     for name, beginning in OUR_PACKAGES.items():
         spec = find_spec(name)
         origin = spec.origin if spec else None
@@ -106,7 +106,7 @@ def checked(
 
 
 def truth(name: str, value: object) -> bool:
-    """Return a truth value, Python's or numpy's, or refuse what is none: what is meant by 0.5 nobody can know.
+    """Return a truth value, Python's or numpy's; raise an error for anything else, since 0.5 would be ambiguous.
 
     Raises:
         BadValueError: neither True nor False.
@@ -117,7 +117,7 @@ def truth(name: str, value: object) -> bool:
 
 
 def whole(name: str, value: object, *, least: int = 0) -> int:
-    """Return a whole number, such as a seed, or refuse what is none.
+    """Return a whole number, such as a seed; raise an error for anything else.
 
     Raises:
         BadValueError: no whole number, or one below `least`.
@@ -146,7 +146,7 @@ def missing_extra(what: str, libraries: str, extra: str) -> UserError:
 
 
 SHOWN_CHARACTERS = 60
-"""Longer values are cut, so that a message stays readable whatever was given."""
+"""Longer values are cut, so that a message remains readable for any value."""
 
 
 def short(value: object) -> str:

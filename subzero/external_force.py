@@ -97,7 +97,7 @@ class Term:
     coefficient: float
 
     def __post_init__(self) -> None:
-        """Refuse what is not in the tables."""
+        """Raise an error for a name that is not in the tables."""
         for word, known in ((self.axis, AXES), (self.feature, tuple(FEATURES))):
             if not isinstance(word, str) or word not in known:
                 raise BadValueError(

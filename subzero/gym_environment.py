@@ -32,7 +32,7 @@ from subzero.simulation.stepper import RunStoppedError, Simulator
 try:
     import gymnasium
     import gymnasium.vector
-except ImportError as missing:  # pragma: no cover - told to the user
+except ImportError as missing:  # pragma: no cover - reported to the user
     raise missing_extra("The environment", "Gymnasium", "gym") from missing
 
 ENVIRONMENT = "subzero/TetheredHeading-v0"

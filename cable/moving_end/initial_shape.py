@@ -87,7 +87,7 @@ def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, p
     `drum`.
 
     Args:
-            line: with space for its segments; filled, relative to the second end.
+        line: with space for its segments; filled, relative to the second end.
         held: the equilibrium.
         tow: velocity of its first end (3,); even along the cable to the other. [m/s]
         drum: velocity of its second end (3,). [m/s]

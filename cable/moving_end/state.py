@@ -39,7 +39,7 @@ class Layout(Record):
         segment_length, grading: new segments are `segment_length` + `grading` s long, s from the tow point. [m], [-]
         far_length, far_grading: farther than this from both ends, segments are joined to longer ones, by so much per
             metre (`remeshing.join_far`); 0: none are. [m], [-]
-            run_in: length L₀ from the tow point in which segments are shorter (`spacing`), 0 for none. [m]
+        run_in: length L₀ from the tow point in which segments are shorter (`spacing`), 0 for none. [m]
         free_end: whether the far end is a free tail instead of the drum.
         tail_drag: ½ρC_dA of a drogue there. [kg/m]
     """
@@ -163,8 +163,8 @@ class Line(NamedTuple):
         forcing: a further force per length on segment j at level NEW (nodes, 3), for made-up solutions. [N/m]
         slip, normal_gain: corrections for the arc that a segment stands for (nodes,), see `chord_correction`. [m/s, 1]
         load: ∫(∂p/∂t + D − w_c k) ds of the segments at level NEW (nodes, 3). [N]
-            blocks: of the Newton matrix (5, nodes, 4, 4): `LOWER`, `DIAGONAL`, `UPPER`, and for a cable with bending
-                stiffness `LOWER2` and `UPPER2`, see `block_solver`.
+        blocks: of the Newton matrix (5, nodes, 4, 4): `LOWER`, `DIAGONAL`, `UPPER`, and for a cable with bending
+            stiffness `LOWER2` and `UPPER2`, see `block_solver`.
         pivots: of the factored blocks (nodes, 4).
         rows: residual, guess and Newton step of the unknowns (3, nodes, 4).
     """

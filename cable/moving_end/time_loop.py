@@ -129,7 +129,7 @@ def follow_path(
         record: filled from row 0 on, the start.
 
     Returns:
-            the number of filled rows: all, unless it failed; `line.ends.solved` holds how the last step was solved.
+        the number of filled rows: all, unless it failed; `line.ends.solved` holds how the last step was solved.
     """
     rows, used = path.times.size, line.ends.count + 1
     suggested = FIRST_STEP * (path.times[1] - path.times[0])

@@ -75,7 +75,7 @@ def try_step(
     Return whether there is a solution; `line.ends.solved` says how it was found.
 
     Args:
-            line: the cable; levels NOW and BEFORE are not changed.
+        line: the cable; levels NOW and BEFORE are not changed.
         step: Δt. [s]
         tow: position of the tow point at the new time, earth axes (3,). [m]
         water: how the water moves.

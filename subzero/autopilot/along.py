@@ -42,7 +42,7 @@ SIZE = 1e-5
 SMALLEST = 1e-8
 """Where the disturbed steps do not do the same, such as to split a segment, smaller ones are tried down to this."""
 ROOM = 32.0
-"""Room for cable to begin with, beyond what is out; doubled as often as needed. [m]"""
+"""Initial capacity for cable, beyond the cable that is out; doubled as often as needed. [m]"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -161,10 +161,10 @@ def linearise_along(
     Steps and segments are those of `subzero.simulate`: finer than the trial's where its `rtol` asks for it.
 
     Args:
-        scenario: what is run: its start, commands, water and steps.
+        scenario: the scenario to run: its start, commands, water and steps.
         model: another model than the scenario's.
         start: a steady motion to begin with instead, its cable straight behind, its commands held to the end; heading,
-            depth and steps stay the scenario's, as they are.
+            depth and steps remain those of the scenario.
         duration: how long; the scenario's by default. [s]
 
     Raises:

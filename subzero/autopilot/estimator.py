@@ -5,7 +5,7 @@
 
 Sway speed and rudder angle are not measured. The gains come from `control.lqr` with the matrices in `Gains`, the filter
 from `control.dlqe` on the model sampled at the controller's rate. Both are scheduled on the speed. The force of the
-cable is not in the filter's model: feed-forward cancels it, and the integral takes what is left.
+cable is not in the filter's model: feed-forward cancels it, and the integral removes the remainder.
 """
 
 from __future__ import annotations

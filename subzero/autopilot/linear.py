@@ -9,7 +9,7 @@ limits, dead bands or play: at a command inside a dead band the true derivative 
 
 A cable pulls the heading back to the line from the drum. Only the whole picture, cable and all, may be turned about the
 drum, which is the pole at 0 that is left: it stands for the bearing, which moves on over a length S of way, not for
-the heading. What this model promises: 10 % of gain and 10° of phase from 0.3 to 4 rad/s, while the cable grows by less
+the heading. Accuracy of this model: 10 % of gain and 10° of phase from 0.3 to 4 rad/s, while the cable grows by less
 than two fifths of its length in a period (docs/autopilot.md). For anything else than a straight way there is
 `linearise_along`.
 
@@ -247,7 +247,7 @@ def _rows(names: tuple[str, ...], port: str, mixed: tuple[str, str]) -> dict[str
 
 
 def _spread(row: np.ndarray) -> np.ndarray:
-    """Return how the signals move when the one that `row` reads moves by one and its opposite stays."""
+    """Return the change of the signals when the one that `row` reads moves by one and its opposite does not move."""
     return row / float(row @ row)
 
 

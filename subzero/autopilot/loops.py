@@ -22,7 +22,7 @@ from subzero.errors import UserError
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Law:
-    """The control law of a loop: what is fed back, with which gains. Frozen, so that loops can share it.
+    """The control law of a loop: the states it feeds back, and the gains. Frozen, so that loops can share it.
 
     Attributes:
         measured: channels that are fed back: the tracked one alone, or its rate and it.

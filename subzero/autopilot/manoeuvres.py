@@ -67,7 +67,7 @@ class Program(ABC):
 
     @abstractmethod
     def after(self, now: Observation, started: Observation) -> Command:
-        """Return the command once the manoeuvre has begun."""
+        """Return the command after the start of the manoeuvre."""
 
     def turned(self, channel: str, now: Observation, started: Observation) -> float:
         """Return how far an angle has changed, to the side of the rudder or planes [rad]; refuse an unknown one."""
@@ -257,7 +257,7 @@ def manoeuvre(
         speed: of the bare hull in the straight run, which the propeller is set for. [m/s]
         tethered: with the cable.
         model: another model than the scenario's.
-        progress: told the fraction that is done.
+        progress: called with the fraction that is done.
 
     Raises:
         UserError: there is no such manoeuvre, a size of nothing or beyond the fins, no steady motion at this speed.

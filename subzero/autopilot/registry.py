@@ -1,4 +1,4 @@
-"""The one table of autopilots, and of what can be fed forward, by name.
+"""The one table of autopilots, and of feed-forward models, by name.
 
 To add one of your own: a small file with a class as `flight.Autopilot` says, and a line here; or hand the object to
 `fly`; or give the path of the file as the name (`from_file`), on the command line too:
@@ -7,7 +7,8 @@ To add one of your own: a small file with a class as `flight.Autopilot` says, an
         return Mine(tuning, sample_time, cable)
 
 The file has to have a function `make`; what it returns has to be as `flight.Autopilot` says. `tuning` holds the gains
-and trims of the vehicle, `cable.wrench(reading, last_command)` tells what the cable does to it, and may be ignored.
+and trims of the vehicle, `cable.wrench(reading, last_command)` returns the cable's wrench on it, and need not be
+used.
 """
 
 from __future__ import annotations
@@ -95,7 +96,7 @@ FEED_FORWARD: dict[str, Callable[[Tuning, scenarios.Trial, float, Model], CableM
     "formula": lambda tuning, trial, sample_time, believed: FormulaCable(tuning, believed),
     "model": lambda tuning, trial, sample_time, believed: TwinCable(trial, sample_time, believed),
 }
-"""Name → what makes a cable model, from a tuning, a trial, a sample time [s] and what is believed of the model."""
+"""Name → factory of a cable model, from a tuning, a trial, a sample time [s] and the assumed model."""
 
 
 def make(

@@ -36,7 +36,7 @@ class Sensor:
         bias: constant error.
         drift: growth of a random walk: its standard deviation is drift·√t. [unit/√s]
         quantum: samples are whole multiples of this; 0 is exact.
-        delay: until a sample is told. [s]
+        delay: from the sample to its reading. [s]
         drop_out: probability that a sample is lost.
 
     Raises:
@@ -118,7 +118,7 @@ class Sensors:
         self._running = [_Running(sensor, self.seed) for sensor in self.sensors]
 
     def read(self, seen: Observation) -> Observation:
-        """Return what the sensors tell now; NaN for channels that have none. (Clocks are exact.)"""
+        """Return the readings of the sensors now; NaN for channels without a sensor. (Clocks are exact.)"""
         reported = {sensor.sensor.channel: sensor.read(seen) for sensor in self._running}
         return UNKNOWN._replace(time=seen.time, **reported)
 

@@ -55,7 +55,7 @@ def calibrate(
             if empty, the twelve that records usually determine.
         vehicle: name or file of the vehicle to begin with, in the place of those of the trials.
         commands: "record" or "scenario", if a record's commands may differ from the scenario's.
-        progress: told the fraction that is done, and what is being done.
+        progress: called with the fraction that is done, and the task in progress.
         quick: the fit and its intervals only, without profiles and advice.
 
     Raises:
@@ -118,11 +118,11 @@ def _check(logged: Sequence[Logged]) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class _Work:
-    """A calibration while it is done.
+    """A calibration in progress.
 
     Attributes:
-        progress: told the fraction that is done, and what is being done.
-        seconds: what was done → how long it took. [s]
+        progress: called with the fraction that is done, and the task in progress.
+        seconds: task → how long it took. [s]
     """
 
     progress: Progress

@@ -33,7 +33,7 @@ from subzero.diagnosis.inference import (
 UNDETERMINED_ABOVE = 0.5
 """What is left of the standard deviation beforehand, from which on the records do not determine it. [-]"""
 SMALL_PART = 0.2
-"""Parts of a direction smaller than this share of the largest, in priors, are not told. [-]"""
+"""Parts of a direction smaller than this share of the largest, in priors, are not reported. [-]"""
 AT_BOUND = 1e-9
 
 
@@ -198,11 +198,12 @@ def _errors(
 
 
 MOST_WANDER = 2.5
-"""Where what is left wanders by more than so many usual levels, it is a misfit and no noise. [-]"""
+"""Where the remaining residuals wander by more than so many usual levels, they are a misfit and not noise. [-]"""
 
 
 def refused(numbers: Sequence[Number], work: Fitted) -> tuple[str, ...]:
-    """Say in sentences why a fit is no calibration: it leaves what is no noise, or found no minimum within bounds.
+    """Return in sentences why a fit is not a calibration: it leaves more than noise, or found no minimum within
+    bounds.
 
     A wrong minimum has intervals as narrow as the right one; what gives it away is the colour of what it leaves, and a
     number at its bound that makes up for another. Noise is estimated behind the fit, and a misfit would pass for slow
@@ -235,18 +236,18 @@ def refused(numbers: Sequence[Number], work: Fitted) -> tuple[str, ...]:
 
 
 def _is_coarse(noise: Noise) -> bool:
-    """Say whether a channel is rounded so coarsely that what is left is never white: where it hardly moves, the error
-    of the rounding is the same for many samples.
+    """Return whether a channel is rounded so coarsely that its residuals are never white: where it hardly moves, the
+    error of the rounding is the same for many samples.
     """
     return bool(noise.resolution > COARSE * math.sqrt(12.0) * noise.white)
 
 
 COARSE = 0.5
-"""Rounding errors of more than this share of the white noise are told apart from it. [-]"""
+"""Rounding errors of more than this share of the white noise are distinguished from it. [-]"""
 STRANGE_P = 1e-4
 """A channel whose whitened residual is white with less than this probability is no noise. [-]"""
 STRANGE_NOISE = 3.0
-"""Noise of more than so many usual levels is told: it may be what the vehicle cannot do. [-]"""
+"""Noise of more than so many usual levels is reported: it may be an effect that the model does not contain. [-]"""
 
 
 def strange(work: Fitted) -> tuple[str, ...]:

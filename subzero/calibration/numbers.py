@@ -1,8 +1,8 @@
-"""The numbers that are free in a calibration, with their priors; and what else may be a little off.
+"""The numbers that are free in a calibration, with their priors; and other numbers that may deviate a little.
 
 A number of the vehicle's (or the cable's) file becomes an effect, in the terms of a diagnosis: a deviation z of the
 number in its own unit, with a prior N(0, σ²), σ the width of the range of the file and no less than `LEAST_PRIOR_SHARE`
-of the number. Everything of the catalogue that moves none of them stays free within its tolerance.
+of the number. All effects of the catalogue that move none of them remain free within their tolerances.
 """
 
 from __future__ import annotations
@@ -162,7 +162,9 @@ def _number(problem: Problem, name: str, declared: tuple[float, float] | None) -
 
 
 def _tolerance(problem: Problem, name: str) -> float:
-    """Return by how much a number may be off in a diagnosis: what is declared, or what causes that move it may."""
+    """Return by how much a number may deviate in a diagnosis: its declared tolerance, or that of causes that move
+    it.
+    """
     setting = problem.records[0].setting
     if name in setting.trial.tolerances:
         return float(setting.trial.tolerances[name])
@@ -190,7 +192,7 @@ def _bounds(nominal: float, low: float, high: float) -> tuple[float, float]:
 def with_free_numbers(problem: Problem, numbers: Sequence[Number]) -> tuple[Problem, np.ndarray]:
     """Return the problem in which numbers are free, and the prior variances of all its entries (k,).
 
-    Beside the numbers stay those causes of the catalogue that move none of them, within tolerance.
+    In addition to the numbers, those causes of the catalogue that move none of them remain free, within tolerance.
     """
     setting = problem.records[0].setting
     effects = list(dict.fromkeys(entry.effect for entry in problem.entries if entry.record < 0))

@@ -1,4 +1,6 @@
-"""What a calibration says, as values: estimates, what is not determined, held-out errors, what to fly."""
+"""The result of a calibration, as values: estimates, undetermined directions, held-out errors, advice on trials to
+fly.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +32,8 @@ class Estimate:
         low, high: the interval of 95 %.
         prior_sd: standard deviation beforehand, from the range of the file.
         tolerance: how far a healthy vehicle may be from the estimate: its uncertainty, and what was allowed before.
-        is_determined: the records, and not what was believed beforehand, say what it is.
-        is_at_bound: it would go beyond what is possible.
+        is_determined: the records, and not the prior alone, determine the value.
+        is_at_bound: the estimate is at a bound of the possible values.
     """
 
     name: str
@@ -57,8 +59,8 @@ class Direction:
     """A common change of some numbers that the records hardly show.
 
     Attributes:
-        parts: name → change of one standard deviation of what is left, in the number's unit; the largest ones.
-        left: share of the standard deviation beforehand that is left.
+        parts: name → change of one remaining standard deviation, in the number's unit; the largest ones.
+        left: remaining share of the prior standard deviation.
         sentence: in words.
     """
 

@@ -1,6 +1,6 @@
 """The calibrated vehicle (or cable) as a file that every command takes: the file it was, with the numbers estimated.
 
-Of each number `value`, `range` (the interval of 95 %), `tolerance` and `source` are new; all else stays as it was
+Of each number `value`, `range` (the interval of 95 %), `tolerance` and `source` are new; all else is kept as it was
 written, and a section [provenance] says which records made it, when, and with which version. A tolerance is what a
 diagnosis allows a healthy vehicle to be off: the uncertainty of the estimate on top of what was allowed before,
 

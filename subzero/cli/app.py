@@ -203,8 +203,8 @@ def simulate(
     Args:
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         untethered: leave the cable away.
-        inputs: what is simulated besides the scenario.
-        kept: what is kept of it, and where.
+        inputs: inputs of the simulation besides the scenario.
+        kept: results to keep, and where.
         check: run it once more with half the steps and half the segment length, and say what changes.
         outputs: which files are made, and how.
         output_mode: how the command speaks.
@@ -250,9 +250,9 @@ def compare(
 
     Args:
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
-        measured: CSV file of measured channels, to set beside both runs.
-        inputs: what is simulated besides the scenario.
-        kept: what is kept of it, and where.
+        measured: CSV file of measured channels, to compare with both runs.
+        inputs: inputs of the simulation besides the scenario.
+        kept: results to keep, and where.
         check: run both once more with half the steps and half the segment length, and say what changes.
         outputs: which files are made, and how.
         output_mode: how the command speaks.
@@ -420,7 +420,7 @@ def _effort() -> str:
 
 
 def _note_command(words: Sequence[str]) -> None:
-    """Keep the line that is carried out, for the pages that tell how to do it again; where it writes to is no part."""
+    """Keep the command line, for the pages that state how to repeat it; the output folder is not part of it."""
     kept = [
         word
         for before, word in zip(["", *words], words, strict=False)
@@ -443,7 +443,7 @@ def _refuse(message: str) -> int:
 
 
 def _in_words(error: cyclopts.CycloptsError) -> str:
-    """Say what is wrong with the words of a command."""
+    """Return the error in the words of a command, as a sentence."""
     if isinstance(error, cyclopts.UnusedCliTokensError):
         return f"Unexpected argument: {' '.join(error.unused_tokens or [])}."
     if isinstance(error, cyclopts.MissingArgumentError) and error.argument and error.command_chain:

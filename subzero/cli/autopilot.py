@@ -176,7 +176,7 @@ def _deliver(
     shown: tuple[str, str],
     output_mode: StrictOutputMode,
 ) -> int:
-    """Fly with the cable and without, write and tell; return the exit code."""
+    """Fly with the cable and without, write the results and print a summary; return the exit code."""
     from subzero.autopilot import AutopilotWarning
     from subzero.cli import write_flights
     from subzero.cli.progress import costs_of, progress_bar
@@ -185,7 +185,7 @@ def _deliver(
 
     with open_output_folder(folder) as output_folder:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", AutopilotWarning)  # the outcome tells it, below
+            warnings.simplefilter("ignore", AutopilotWarning)  # the outcome reports it, below
             measured: Measured = {}
             for label in RUNS:
                 with progress_bar(f"Flying {trial.name}, {label}", lambda: costs_of(trial)) as progress:

@@ -28,13 +28,13 @@ if TYPE_CHECKING:
 
 FINE, NO_CALIBRATION = 0, 3
 LAST_WORDS_S = 60.0
-"""An interrupted diagnosis has so long to tell and write what it has. [s]"""
+"""Time that an interrupted diagnosis has to print and write its partial results. [s]"""
 
 COSTS = (
     "What costs are the simulations of the trial. Try --screen, a shorter record, or a longer cable_step_s and "
     "segment_length_m in the scenario."
 )
-"""What is told where a diagnosis stands still."""
+"""Advice that is printed when a diagnosis stands still."""
 
 Flag = Annotated[bool, Parameter(negative=())]
 With = Annotated[Path | None, Parameter(name="--with")]
@@ -143,9 +143,9 @@ def calibrate(
         records: CSV files of one vehicle, or folders of them; several manoeuvres say more than one.
         scenario: what was flown: a name (see "subzero list") or a path; a record's sidecar may name another.
         vehicle: name or file of the vehicle to begin with, instead of the scenario's.
-        out: file of the calibrated vehicle; figures and a JSON file go beside it.
+        out: file of the calibrated vehicle; figures and a JSON file are written next to it.
         commands: whose commands hold if the record and the scenario differ.
-        estimation: what is estimated.
+        estimation: settings of the estimation.
         output_mode: how the command speaks.
     """
     from subzero.calibration.numbers import full_name
@@ -175,13 +175,13 @@ def challenge(
     reveal: Path | None = None,
     output_mode: OutputMode = PLAIN,
 ) -> int:
-    """Hide an effect in a record, to find it with "subzero diagnose"; --reveal tells afterwards what it was.
+    """Hide an effect in a record, to find it with "subzero diagnose"; --reveal shows it afterwards.
 
     Args:
-        scenario: what is flown: a name (see "subzero list") or a path.
+        scenario: the scenario to fly: a name (see "subzero list") or a path.
         seed: draws the effect, its size, and every number within its tolerance.
         out: folder for the record.
-        reveal: folder of a challenge, to be told what is hidden in it.
+        reveal: folder of a challenge, to show the effect hidden in it.
         output_mode: how the command speaks.
     """
     if reveal is not None:
@@ -212,10 +212,10 @@ def add_to(app: cyclopts.App) -> None:
 
 
 def _sorted(files: list[Path], scenario: str | None) -> tuple[str | None, list[Path]]:
-    """Return the scenario among what was named, and the records.
+    """Return the scenario among the named files, and the records.
 
-    A TOML file is a scenario, and so is the name of a shipped one beside a record, even if a folder here has that name:
-    `subzero compare fig6` makes one. With --scenario, or alone, such a folder is one of records.
+    A TOML file is a scenario, and so is the name of a shipped one together with a record, even if a folder here has
+    that name: `subzero compare fig6` makes one. With --scenario, or alone, such a folder is one of records.
     """
     named = [file for file in files if file.suffix == ".toml"]
     if scenario is None and not named:

@@ -125,7 +125,7 @@ def _written(
                 why = f"its record has {len(text) // MEGABYTE} MB, more than is read"
                 raise refusal(record.source, why, "Name fewer columns in a map, or split the log.")
             (output.path / name).write_text(text, encoding="utf-8")
-            read_record(output.path / name)  # what is written can be read
+            read_record(output.path / name)  # check that the written file can be read
     return output.files()
 
 

@@ -54,7 +54,8 @@ class Check(NamedTuple):
 
 
 def doctor(*, output_mode: OutputMode = PLAIN) -> int:
-    """Say what is installed, where machine code is kept, and whether this machine computes what is known exactly.
+    """Report the installed versions, the folder of machine code, and whether this machine reproduces known exact
+    numbers.
 
     Three self-checks take some ten seconds: the straight pull of equation (37), a hanging chain, and the energy balance
     of a run. If one is off, the exit code is 3.

@@ -36,7 +36,7 @@ _exit_message: list[Callable[[], str]] = []
 
 
 def watch() -> None:
-    """Let signals end this process; a signal that is ignored (``nohup``) stays ignored."""
+    """Let signals end this process; a signal that is ignored (``nohup``) remains ignored."""
     woken, waker = socket.socketpair()
     waker.setblocking(False)
     signal.set_wakeup_fd(waker.fileno(), warn_on_full_buffer=False)

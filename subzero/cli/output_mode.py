@@ -25,7 +25,7 @@ class OutputMode:
 
     Attributes:
         as_json: print the result as one JSON object, and nothing else, on standard output.
-        quiet: print no table and no progress; errors and the exit code stay.
+        quiet: print no table and no progress; errors and the exit code remain.
         verbose: print how far to trust the cable too; say on standard error which versions run, where machine code is
             kept, and how long it took.
     """
@@ -36,7 +36,7 @@ class OutputMode:
 
     @contextmanager
     def emit(self, result: Mapping[str, Any]) -> Iterator[None]:
-        """Let what is printed inside be read; with --json the result instead, with --quiet nothing.
+        """Print the output of the block; with --json the result instead, with --quiet nothing.
 
         Args:
             result: plain numbers, texts, lists and mappings.

@@ -1,8 +1,8 @@
-"""Tell a waiting user how far a command is: a bar on the terminal for anything that takes over a second, and one line
-where the work stands still, or will take hours: where it stands, what costs, what to change.
+"""Report the progress of a command: a bar on the terminal for any work that takes over a second, and one line if the
+work stands still, or will take hours: where it stands, the cause of the cost, and the setting to change.
 
-A thread looks after the work, so that it is told even while machine code does not come back. Compiling is no standing
-still: it is counted, function by function, on the bar, or where there is no terminal on a line that grows.
+A thread watches the work, so that it reports even while machine code does not return. Compiling does not count as
+standing still: it is counted, function by function, on the bar, or without a terminal on a line that grows.
 """
 
 from __future__ import annotations
@@ -27,9 +27,10 @@ COMPILING = "Compiling what is not compiled yet (all of it takes about half a mi
 PATIENCE_S = 1.0
 """What takes less needs no bar. [s]"""
 STANDSTILL_S = 20.0
-"""Work that has not moved for so long is told to stand still; so long is a rate watched before it counts. [s]"""
+"""Work that has not moved for so long is reported to stand still; a rate is watched for so long before it counts.
+[s]"""
 LONG_S = 3600.0
-"""Work that will take longer than this is told. [s]"""
+"""Work that will take longer than this is reported. [s]"""
 CHECK_S = 1.0
 """So often the thread looks. [s]"""
 
@@ -49,14 +50,14 @@ def progress_bar(words: str, costs: Callable[[], str] = str) -> ProgressBar:
 
 
 class ProgressBar:
-    """Called with the fraction that is done, shows a bar once the work has taken a while.
+    """A callable that takes the fraction that is done, and shows a bar once the work has taken a while.
 
-    The bar needs a terminal; that the work stands still is told anywhere, once, and so is that it will take hours.
+    The bar needs a terminal; a standstill is reported anywhere, once, and so is work that will take hours.
 
     Args:
-        words: what is done.
-        console: where to.
-        costs: what costs time in this work, and what to change, in a sentence or two.
+        words: the name of the work.
+        console: the console to print to.
+        costs: the cause of the cost of this work, and the setting to change, in a sentence or two.
     """
 
     def __init__(self, words: str, console: Console, costs: Callable[[], str] = str) -> None:
@@ -68,7 +69,7 @@ class ProgressBar:
         self._ended = threading.Event()
 
     def __call__(self, fraction: float, words: str = "") -> None:
-        """Show that this fraction, 0 to 1, is done, and what is being done."""
+        """Show that this fraction, 0 to 1, is done, and the task in progress."""
         if fraction != self._fraction or (words and words != self._words):
             self._moved = monotonic()
         self._words, self._fraction = words or self._words, fraction
@@ -78,7 +79,7 @@ class ProgressBar:
             self._bar.update(self._bar.task_ids[0], completed=fraction, description=self._words)
 
     def check(self) -> None:
-        """Tell if the work stands still, or if its rate so far means hours; each once."""
+        """Report if the work stands still, or if its rate so far means hours; each once."""
         now = monotonic()
         if _compiling():
             self._begun, self._moved = self._begun + CHECK_S, now
@@ -116,7 +117,7 @@ class ProgressBar:
             self._made, counting[0] = now, True
 
     def _end_count(self) -> None:
-        """Go back to what is being done, once nothing is compiled any more."""
+        """Return to the task in progress, once nothing is compiled any more."""
         if self._counting:
             self._counting = False
             if self._bar is not None:

@@ -101,7 +101,7 @@ def add_to(app: cyclopts.App) -> None:
 
 
 LINE_EVERY_S = 30.0
-"""So often a line tells how far it is where there is no terminal for a bar. [s]"""
+"""Interval of the lines that report progress if there is no terminal for a bar. [s]"""
 
 
 class _Bar:

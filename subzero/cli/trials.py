@@ -105,7 +105,7 @@ def validate(path: Path, /, *, output_mode: OutputMode = PLAIN) -> int:
     """Check a file without running it: a scenario, vehicle, cable or sweep (TOML); commands or a record (CSV).
 
     Args:
-        path: the file. All its problems are told at once, each with its line and what is allowed.
+        path: the file. All its problems are reported at once, each with its line and the allowed values.
         output_mode: how the command speaks.
     """
     kind, reported = _record(path) if path.suffix == ".csv" else _toml(path)
@@ -122,7 +122,7 @@ def add_to(app: cyclopts.App) -> None:
 
 
 def _toml(path: Path) -> tuple[str, str]:
-    """Return what a TOML file is, and what is in it; refuse one that cannot be used."""
+    """Return the kind and the contents of a TOML file; raise an error if it cannot be used."""
     from scenarios.contents import contents, locate
     from scenarios.files import read_toml
 
@@ -161,7 +161,7 @@ def _outside(found: Contents) -> int:
 
 
 def _record(path: Path) -> tuple[str, str]:
-    """Return what a CSV file is, and what is in it; refuse one that cannot be used."""
+    """Return the kind and the contents of a CSV file; raise an error if it cannot be used."""
     from scenarios.samples import check_times, read_csv
     from subzero.files.read_file import MOST_OF_A_CSV, UnreadableFileError, read_text
     from subzero.records.record import read_record

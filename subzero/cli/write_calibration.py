@@ -1,5 +1,5 @@
-"""Deliver a calibration: the vehicle's file, JSON (docs/calibration.md explains every key), figures, and what is told
-on the terminal.
+"""Write a calibration: the vehicle's file, JSON (docs/calibration.md explains every key), figures, and the text on
+the terminal.
 """
 
 from __future__ import annotations
@@ -87,9 +87,9 @@ def _print(found: Calibration, output_folder: OutputFolder, out: Path, console: 
 
 FORMAT = "subzero calibration 1"
 STRONG = 0.9
-"""Correlations from this size on are told. [-]"""
+"""Correlations from this size on are reported. [-]"""
 MOST_TOLD = 3
-"""So many directions, correlations and trials are told on the terminal; the JSON file has all."""
+"""Number of directions, correlations and trials that are printed on the terminal; the JSON file has all."""
 WORTH_FLYING = 1.2
 """A trial that makes no interval this many times narrower is not advised. [-]"""
 

@@ -1,4 +1,4 @@
-"""Deliver the runs of a command: all their files, and what is told on the terminal."""
+"""Write the runs of a command: all their files, and the text on the terminal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the command leaves behind: dataset, table, summary, figures, page; and tells: numbers and what matters.
+"""Write the results of a sweep: dataset, table, summary, figures, page; and print numbers and the main effects.
 
 The processes that ran the members draw the figures at the same time.
 """
@@ -39,9 +39,9 @@ FIGURES = ("bands", "histograms", "against", "tornado")
 """All that there may be, in the order in which a page has them."""
 LONGEST_FIRST = ("against", "histograms", "bands", "tornado")
 FILES = (RESULT, TABLE, "summary.json", "report.html", *(f"{name}.png" for name in FIGURES))
-"""What a sweep writes beside its store."""
+"""Files that a sweep writes in addition to its store."""
 SHOWN_REASONS = 5
-"""So many members that failed are told with their reason. [-]"""
+"""Number of failed members that are reported with their reason. [-]"""
 KEPT_REASONS = 100
 """So many stand in the summary; the table has all."""
 

@@ -20,7 +20,7 @@ from subzero.jit import compiled
 from vehicle import BREAKDOWN, STATE_SIZE, battery_voltage, breakdown, deflections, euler_angles
 
 BREATH_S = 0.1
-"""Compiled code computes for about so long before Python moves the progress bar and heeds an interrupt. [s]"""
+"""Compiled code computes for about so long before Python moves the progress bar and handles an interrupt. [s]"""
 MOST_QUICKER = 2.0
 """So many times as many rows are filled at a time as the last time, at most: with more cable, later ones take longer.
 [-]"""
@@ -91,7 +91,7 @@ class Run:
 
 
 class Grid(NamedTuple):
-    """The times of a run and what is kept.
+    """The times of a run and the rows to keep.
 
     Attributes:
         times: (n,). [s]
@@ -148,7 +148,7 @@ class Pace:
 
 
 def new_recording(rows: int, nodes: int, times: int = 0) -> Recording:
-    """Return an empty recording of `rows` rows, with room for `nodes` nodes in all, and a trace of `times` times."""
+    """Return an empty recording of `rows` rows, with space for `nodes` nodes in all, and a trace of `times` times."""
     shapes = {
         "trace": (times, 4),
         "state": (rows, STATE_SIZE),
@@ -243,7 +243,7 @@ BY_NODE, BY_TIME = ("position", "tension", "arc_length"), ("trace",)
 
 
 def cut(recording: Recording, rows: int, used: int) -> Recording:
-    """Return the part of a recording that is filled; its trace stays as it is."""
+    """Return the part of a recording that is filled; its trace is not changed."""
     filled = {name: getattr(recording, name)[:used] for name in BY_NODE}
     filled |= {name: getattr(recording, name) for name in BY_TIME}
     by_row = {name: values[:rows] for name, values in recording._asdict().items() if name not in filled}

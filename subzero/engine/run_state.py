@@ -1,4 +1,4 @@
-"""What a coupled run is made of, as named tuples that compiled code takes: what stays, and what changes."""
+"""The data of a coupled run, as named tuples that compiled code takes: the constants and the state."""
 
 from __future__ import annotations
 
@@ -114,13 +114,13 @@ class Now(Record):
 
 
 class Setup(NamedTuple):
-    """What does not change during a run.
+    """The constants of a run.
 
     Attributes:
         fixed: numbers; `drum` in it is where the drum is at the end of the step that is being tried.
-        orders, track: what the vehicle is told, or how it moves (LINEAR_ROWS or KNOT_ROWS, n).
+        orders, track: the commands to the vehicle, or its motion (LINEAR_ROWS or KNOT_ROWS, n).
         water: how the water moves; its origin is the drum's place at the start.
-        led: how the drum moves, and what its winch is asked for, see `cable.drum_motion` (n, 8).
+        led: motion of the drum, and setpoint of its winch, see `cable.drum_motion` (n, 8).
         added, terms: what the model lacks, see `MissingForce.numbers` (7, n), (m, 5); empty for nothing.
     """
 

@@ -20,7 +20,7 @@ from subzero.engine.run_state import Live, Setup
 from subzero.jit import allocating, compiled, deferred_signals
 
 NO_ROOM = 4
-"""The room that was reserved is nearly full: enlarge it and go on. The other endings are in `coupling`."""
+"""The allocated memory is nearly full: enlarge it and go on. The other endings are in `coupling`."""
 SPARE = 8
 """Nodes that one exchange may add. (A tow point at 40 segments a second would need more: `coupling.FASTEST`.)"""
 
@@ -37,11 +37,11 @@ def run_rows(
     parts: int,
     stride: int,
 ) -> tuple[int, int, int]:
-    """Go from times[first − 1] to times[last − 1], and fill the rows of a recording on the way.
+    """Advance from times[first − 1] to times[last − 1], and fill the rows of a recording on the way.
 
     Args:
-        setup: what stays.
-        live: what changes; at times[first − 1] when called.
+        setup: the constants.
+        live: the state; at times[first − 1] when called.
         recording: filled.
         times: of the run (n,). [s]
         first: time to begin with; 0 writes the row of the start, too.
@@ -51,8 +51,8 @@ def run_rows(
         stride: every so many times are kept as a row, see `recording`.
 
     Returns:
-        times that are behind, nodes in use in rows that are kept, and how it ended (`coupling.FINE` …);
-        `line.ends.solved` tells how the cable's last step was solved.
+        number of times that are done, nodes in use in rows that are kept, and the ending (`coupling.FINE` …);
+        `line.ends.solved` holds how the cable's last step was solved.
     """
     for at in range(first, last):
         ending = _reach(setup, live, recording, times, at, used, parts) if at > 0 else FINE
@@ -61,7 +61,7 @@ def run_rows(
         row = row_of(at, stride)
         after = record_row(setup, live, recording, row, times[at], used)
         note(recording, row, at)
-        if at % stride == 0:  # the row stays; else the next one is written over it
+        if at % stride == 0:  # the row is kept; else the next one is written over it
             used = after
     return last, used, FINE
 

@@ -41,7 +41,7 @@ Values = Mapping[str, float]
 """Name of a slider → where it stands, in its unit; those that are left out stand where the trial has them."""
 
 Progress = Callable[[float], None]
-"""Told the fraction that is done."""
+"""Called with the fraction that is done."""
 
 ATTEMPT_S = 0.2
 """An answer is there within a second: so long for an attempt, as long to repeat it as far as it came, and the rest.
@@ -89,7 +89,7 @@ NUMBERS = (
     ("largest_cable_force_N", "largest cable force [N]", 4),
     ("largest_cable_moment_N_m", "largest cable moment [N m]", 4),
 )
-"""Numbers of a summary that are set beside the nominal ones: key, words, decimals."""
+"""Numbers of a summary that are compared with the nominal ones: key, words, decimals."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -203,12 +203,12 @@ def _allowed(trial: Trial, name: str, low: float, high: float) -> tuple[float, f
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """What came of some positions of the sliders.
+    """The result of some positions of the sliders.
 
     Args:
         values: the positions.
         run: the run; None where they were refused.
-        refusals: name of a slider → what is wrong with it, in the words of the reader of files; "" where it is no
+        refusals: name of a slider → its problem, in the words of the reader of files; "" where it has no
             slider of its own.
         seconds: how long it took. [s]
         rough: how the run is rough, in words; empty for the run that `subzero.simulate` gives.
@@ -260,7 +260,7 @@ class Exploration:
 
         Args:
             values: the positions.
-            progress: told the fraction that is done; what it raises ends the run.
+            progress: called with the fraction that is done; an exception that it raises ends the run.
         """
         *_, last = self.answers(values, progress)
         return last
@@ -310,7 +310,7 @@ class Exploration:
             return self.simulate(replace(plain, duration=steps * trial.cable_step), progress=progress)
 
     def _refusals(self, error: UserError) -> dict[str, str]:
-        """Return what is wrong, slider by slider."""
+        """Return the problems, slider by slider."""
         if not isinstance(error, ScenarioError):
             return {"": str(error)}
         owner = {key: slider.name for slider in self.sliders.values() for key in slider.shares}
@@ -373,7 +373,7 @@ def _cells(nominal: float | None, changed: float | None, digits: int) -> tuple[s
 
 
 def text_with(trial: Trial, changes: Values, folder: Path) -> str:
-    """Return the text of the file of a trial with other numbers; its remarks stay.
+    """Return the text of the file of a trial with other numbers; its remarks are kept.
 
     Args:
         trial: as its file has it.
@@ -439,12 +439,12 @@ class NewerError(Exception):
 
 
 class Newest(Generic[Request, Found]):
-    """A thread that works on the newest request: one that waits is forgotten for it, one in work is given up.
+    """A thread that works on the newest request: a waiting request is dropped for it, a running one is abandoned.
 
     Args:
-        work: takes a request, and what it calls with the fraction that is done now and then; gives what is found.
-        done: takes what was found, in that thread.
-        failed: takes what a bug has raised, which is printed too.
+        work: takes a request, and a function to call with the fraction that is done now and then; returns the result.
+        done: takes the result, in that thread.
+        failed: takes an exception caused by a bug, which is printed too.
     """
 
     def __init__(

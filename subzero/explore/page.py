@@ -2,9 +2,9 @@
 player, numbers.
 
 Every tab has its own positions of the sliders and its own thread, which runs the newest of them. The replay stands in
-a frame, which is loaded once and then takes other runs: camera and time stay where they are. Who may reach the page is
-`subzero.explore.local_access`. What a browser sends may be anything: it is checked where it comes in, `_position` and
-`_take`.
+a frame, which is loaded once and then takes other runs: camera and time do not change. The access to the page is
+limited by `subzero.explore.local_access`. A browser may send anything: it is checked where it comes in, `_position`
+and `_take`.
 
 Needs the extra ``[explore]``; NiceGUI takes a second to import, and is imported where a page is served.
 """
@@ -161,7 +161,7 @@ class Page:
         )
 
     def replay(self, run: xr.Dataset) -> dict[str, Any] | None:
-        """Return the replay of a run beside the nominal one; None where there is nothing to see."""
+        """Return the replay of a run next to the nominal one; None where there is nothing to see."""
         from subzero.page import Actor, encode
 
         if run.sizes["time"] < 2 or self.exploration.nominal.sizes["time"] < 2:
@@ -198,7 +198,7 @@ class Page:
         """Fill a tab of the browser."""
         from nicegui import ui
 
-        while len(self.tabs) >= MOST_TABS:  # the oldest, of those that nobody looks at if there is one
+        while len(self.tabs) >= MOST_TABS:  # close the oldest, of those that are not in view if there are any
             tabs = self.tabs.values()
             min(tabs, key=lambda tab: tab.client.has_socket_connection).client.delete()
         name = uuid4().hex
@@ -212,7 +212,7 @@ class Page:
 
 
 class Tab:
-    """One tab of a browser: where its sliders stand, and what is shown.
+    """One tab of a browser: the positions of its sliders, and the run that is shown.
 
     Args:
         page: whose tab it is.
@@ -339,7 +339,7 @@ class Tab:
             self.saved.set_text(f"Wrote {name}. Run it: subzero simulate {shlex.quote(name)}")
 
     def show(self, shown: Shown) -> None:
-        """Show an answer: the run, its numbers and warnings; or what was refused, beside its slider."""
+        """Show an answer: the run, its numbers and warnings; or the refusals, next to their sliders."""
         answer = shown.answer
         for name, knob in self.knobs.items():
             knob.say(answer.refusals.get(name, ""))
@@ -414,7 +414,7 @@ def _take(take: Callable[..., None], sender: str, *message: Any) -> None:
 
 
 def _position(event: Any) -> float | None:
-    """Return the number that a browser has sent; None for what is none."""
+    """Return the number that a browser has sent; None if it is not a number."""
     sent = event.args
     try:
         return real(float(sent)) if isinstance(sent, str) else real(sent)
@@ -431,11 +431,12 @@ def _cell(kind: str, text: str) -> Any:
 
 
 class Knob:
-    """One slider on the page: it, the number beside it that takes any value, and what is wrong with it.
+    """One slider on the page: the slider, a number field next to it that takes any value, and the problem with the
+    value.
 
     Args:
-        slider: what it moves.
-        moved: told its name and its position when somebody moves it.
+        slider: the parameter that it moves.
+        moved: called with its name and its position when a user moves it.
     """
 
     def __init__(self, slider: Slider, moved: Callable[[str, float], None]) -> None:
@@ -466,7 +467,7 @@ class Knob:
                 on_change=lambda event: self.turn(event.value),
             ).props(f'aria-label="{slider.words}{unit}"')
             for element in (self.number, self.handle):
-                element._event_args_to_value = _position  # type: ignore[assignment, method-assign]  # NiceGUI's fail with what is none
+                element._event_args_to_value = _position  # type: ignore[assignment, method-assign]  # NiceGUI's fails on non-numbers
             ui.label(_range_words(slider)).classes("range")
             self.refused = ui.label().classes("refused")
         self.put(slider.nominal)
@@ -487,11 +488,11 @@ class Knob:
         self.back.set_visibility(value != self.slider.nominal)
 
     def say(self, words: str) -> None:
-        """Say what is wrong with the value; nothing if nothing is."""
+        """Show the problem with the value; nothing if there is none."""
         self.refused.set_text(words)
 
 
 def _range_words(slider: Slider) -> str:
-    """Return where the trial has it, and what is plausible, in a few words."""
+    """Return the value of the trial, and the plausible range, in a few words."""
     plausible = "" if slider.declared is None else "; plausible {:g} … {:g}".format(*slider.declared)
     return f"{slider.low:g} … {slider.high:g}, in the file {slider.nominal:g}{plausible}"

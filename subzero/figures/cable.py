@@ -42,7 +42,7 @@ ALONG, OVER = 240, 400
 """Points along the cable and times of an image of the tension, at most. [-]"""
 
 SHAPES = 5
-"""So many shapes tell how a cable grows, and can still be told apart."""
+"""So many shapes show how a cable grows, and can still be distinguished."""
 SIDE = 5.4
 """Width and height of a view in space. [inch]"""
 LETTERS_A_LINE = 64
@@ -172,7 +172,7 @@ def longest(run: xr.Dataset, *candidates: int) -> int:
 
 
 def in_scale(axes: Axes, *, stretch: bool = False) -> float:
-    """Show both directions in the same scale, by widening the one that has room to spare.
+    """Show both directions in the same scale, by widening the one that has space to spare.
 
     Args:
         axes: a view of the cable.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 ROW = 0.2
 """Height of a row of a list of numbers. [inch]"""
 LEGEND = 0.75
-"""Room for the legend below the profiles. [inch]"""
+"""Height of the legend below the profiles. [inch]"""
 RISE_95 = 3.84
 """Rise of −2 log posterior at the ends of an interval of 95 %."""
 COLUMNS = 4
@@ -117,7 +117,7 @@ def errors(found: Calibration, title: Title) -> Figure:
 
 
 def profiles(found: Calibration, title: Title) -> Figure:
-    """Draw how much worse the fit gets with each number held elsewhere, beside what its interval says."""
+    """Draw how much worse the fit gets with each number held at other values, and its interval."""
     columns = min(len(found.profiles), COLUMNS)
     figure, panels = sheet(math.ceil(len(found.profiles) / columns), columns, title)
     for axes, (name, each) in zip(panels, found.profiles.items(), strict=False):

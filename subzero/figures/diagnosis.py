@@ -89,7 +89,7 @@ FORMULA_LENGTH = 110
 
 
 def _what(unknown: Unknown) -> str:
-    """Return what is drawn in words: what it does, and which sign that has."""
+    """Return the label of a drawn effect: its force or drift, and the meaning of its sign."""
     if unknown.is_drift:
         return f"Drift of the {unknown.axis.replace('_', ' ')}'s sensor, that no cause explains; band: 95 %"
     does = something(unknown.axis, unknown.force)
@@ -138,7 +138,7 @@ def evidence(verdict: Verdict, title: Title) -> Figure | None:
 
 
 NAME_LENGTH, NARROW_NAME_LENGTH = 50, 36
-"""So many letters of an explanation fit beside its bar; in a narrow figure."""
+"""Number of letters of an explanation that fit next to its bar; in a narrow figure."""
 
 
 def _wrapped(words: str) -> str:
@@ -189,7 +189,7 @@ def detectable(verdict: Verdict, title: Title) -> Figure | None:
 
 
 def _short(words: str) -> str:
-    """Return as much of some words as fits beside a bar."""
+    """Return as many of the words as fit next to a bar."""
     most = 38 if style.width() >= style.ONE_COLUMN else 34
     return words if len(words) <= most else f"{words[: most - 1].rstrip()}…"
 
@@ -248,7 +248,7 @@ BAR_ROW, NARROW_LEFT = 0.17, 0.6
 def _bars(
     columns: int, rows: int, title: Title, *, left: float = 0.2, apart: float = 0.72
 ) -> tuple[Figure, list[Axes]]:
-    """Return a sheet for horizontal bars, as high as they need, with room for their names."""
+    """Return a sheet for horizontal bars, as high as they need, with space for their names."""
     from subzero.figures.style import BOTTOM, TITLE_LINE, TOP
 
     figure, panels = sheet(1, columns, title)
@@ -354,7 +354,7 @@ class Drawn(NamedTuple):
 
     @property
     def _is_rival(self) -> bool:
-        """Whether "nothing is wrong", which the calibrated model stands for, is among what is left."""
+        """Whether "nothing is wrong", which the calibrated model represents, is among the remaining explanations."""
         return self.verdict.on_model == UNDECIDED and self._probability(CALIBRATED) >= WORTH_A_LINE
 
     def _probability(self, model: str) -> float:
@@ -476,7 +476,9 @@ def _overlay(axes: Axes, drawn: Drawn, channel: str) -> None:
 
 
 def _recorded_wrong(curves: Curves, channel: str) -> np.ndarray:
-    """Return time and value of the samples that an error in the data befalls, as they were recorded (n, 2)."""
+    """Return time and value of the samples that are affected by an error in the data, as they were recorded (n,
+    2).
+    """
     time, values = curves.recorded.get(channel, (np.empty(0), np.empty(0)))
     right = set(zip(np.round(curves.time, 6), curves.measured[channel], strict=True))
     pairs = zip(np.round(time, 6), values, strict=True)
@@ -484,7 +486,7 @@ def _recorded_wrong(curves: Curves, channel: str) -> np.ndarray:
 
 
 def _residuals(axes: Axes, drawn: Drawn, channel: str) -> None:
-    """Draw measured − simulated of each model, smoothed, beside the noise of the sensor and the step of its values."""
+    """Draw measured − simulated of each model, smoothed, with the noise of the sensor and the step of its values."""
     time, noise = drawn.curves.time[drawn.used(channel)], drawn.noise.get(channel)
     _band(axes, noise)
     axes.axhline(0.0, color=style.GREY, linewidth=0.7)

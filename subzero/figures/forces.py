@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TERMS_SHOWN = 6
-"""The largest terms are drawn each, the others as their sum: more lines cannot be told apart."""
+"""The largest terms are drawn each, the others as their sum: more lines cannot be distinguished."""
 
 VISIBLE = 1e-3
 """What never reaches this share of the largest is not worth a line."""

@@ -41,7 +41,7 @@ Runs = dict[str, "xr.Dataset"]
 
 BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#E69F00", "#56B4E9"
 INK, GREY, PALE = "#222222", "#8A8A8A", "#E3E3E3"
-"""Okabe and Ito's colours for all kinds of sight, purple after Tol; ink for text, grey for what is behind."""
+"""Okabe and Ito's colours for all kinds of sight, purple after Tol; ink for text, grey for the background."""
 
 TENSION = LinearSegmentedColormap.from_list(
     "tension", [(0.0, "#FFFACC"), (0.33, "#FFB833"), (0.7, "#F24721"), (1.0, "#C70547")]
@@ -89,10 +89,10 @@ NARROWEST, WIDEST = 3.0, 20.0
 """So wide may a figure be: 3.4 is one column of a journal page. [inch]"""
 
 ONE_COLUMN = 5.0
-"""A figure that is not as wide has panels that stand beside one another else below one another. [inch]"""
+"""In a figure that is narrower than this, panels that are otherwise side by side are below one another. [inch]"""
 
 LEFT, RIGHT = 0.72, 0.11
-"""Room to the left and to the right of the panels. [inch]"""
+"""Margins to the left and to the right of the panels. [inch]"""
 
 LETTERS_PER_INCH = 15.5
 """So many letters of a headline fit on an inch."""
@@ -129,9 +129,9 @@ def width() -> float:
 
 @contextmanager
 def page_width(inches: float) -> Iterator[None]:
-    """Let figures that are drawn inside be so wide: 7.2 for two columns of a journal page, 3.4 for one. [inch].
+    """Draw figures inside this block at a width: 7.2 for two columns of a journal page, 3.4 for one. [inch].
 
-    Text keeps its size; panels beside one another stand below one another where the page is narrow.
+    Text keeps its size; panels that are side by side are drawn below one another where the page is narrow.
 
     Raises:
         UserError: no page is as narrow, or as wide.
@@ -149,7 +149,7 @@ def page_width(inches: float) -> Iterator[None]:
 
 
 def _lines_of(title: Title) -> list[str]:
-    """Return the lines of a title, the first one beside the scenario's name."""
+    """Return the lines of a title; the scenario's name and the first one share a line."""
     room = TITLE_LENGTH * (width() - LEFT) - len(title.scenario)
     return textwrap.wrap(title.words, max(int(room), 12))[: MOST_TITLE_LINES + (width() < ONE_COLUMN)]
 
@@ -185,7 +185,7 @@ def sheet(rows: int, columns: int, title: Title) -> tuple[Figure, list[Axes]]:
 
 
 def _style(axes: Axes) -> None:
-    """Thin axes, a faint grid, ticks small enough to keep out of the way, no offset beside them (27.003, not 0.003)."""
+    """Draw thin axes, a faint grid, small ticks, and no offset at the axes (27.003, not 0.003)."""
     axes.grid(visible=True, color=PALE, linewidth=0.6)
     axes.set_axisbelow(True)
     axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
@@ -235,7 +235,7 @@ def _inches(axes: Axes) -> tuple[float, float]:
 
 
 def legend(axes: Axes, columns: int = 3, *, tight: bool = False, **where: Any) -> None:
-    """Show the legend, small; if no place is given, above the curves, where room is made for it.
+    """Show the legend, small; if no place is given, above the curves, where space is made for it.
 
     Args:
         axes: a panel with labelled curves.

@@ -49,7 +49,7 @@ class Overview(NamedTuple):
         return f"<div><strong>{escape(cut(self.title))}</strong><table>{rows}</table></div>"
 
     def _shown(self) -> Sequence[tuple[str, ...]]:
-        """Return the rows that there is room for, and how many more there are."""
+        """Return the rows that fit, and how many more there are."""
         if len(self.rows) < MOST_LINES:
             return self.rows
         kept = self.rows[: MOST_LINES - 2]

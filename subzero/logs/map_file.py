@@ -158,7 +158,7 @@ def _read_clock(entry: dict[str, Any], table: Table, problems: list[str]) -> Clo
 
 
 def _problems_of_line(name: str, entry: Any, table: Table) -> list[str]:
-    """Return what is wrong with the line of one column."""
+    """Return the problems of the line of one column."""
     wrong, column = _keys(short(name), entry, COLUMN_KEYS), table.columns.get(name)
     if not wrong and not {"channel", "unit"} <= set(entry):
         wrong = [f"{short(name)} needs channel and unit"]

@@ -83,7 +83,7 @@ class Clock:
 
 @dataclass(frozen=True, kw_only=True)
 class Map:
-    """How a log becomes a record, what the user has to decide first, and what is odd about it, in sentences."""
+    """How a log becomes a record, the decisions that the user has to make first, and its anomalies, in sentences."""
 
     clock: Clock
     lines: tuple[Line, ...] = ()
@@ -120,7 +120,7 @@ def find_clock(table: Table) -> tuple[Clock, tuple[str, ...]]:
 
 
 def _is_time(table: Table, name: str) -> Named | None:
-    """Return what is said of a column of numbers that is a time by its name."""
+    """Return the finding for a column of numbers that is a time by its name."""
     found, column = recognised(name, table.columns[name].unit), table.columns[name]
     return found if found and found.channel == TIME.name and np.isfinite(column.values).any() else None
 
@@ -223,7 +223,7 @@ def _line(name: str, named: Named, found: Findings, choice: str) -> Line:
 
 
 def _question(line: Line, found: Findings) -> str:
-    """Return what is asked about a column whose unit is not decided."""
+    """Return the question about a column whose unit is not decided."""
     units = _either(found.units[line.channel]) or "no unit that is known"
     if line.is_open:
         return f"{short(line.name)} ({line.channel}): its numbers cannot be in the unit of its name; {units} would do"

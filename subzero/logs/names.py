@@ -24,7 +24,7 @@ BRACKET = r"[\[(]([^\])]*)[\])]?"
 
 
 class Unit(NamedTuple):
-    """A unit that loggers use: what is written times `factor`, plus `offset`, is in the channel's unit."""
+    """A unit that loggers use: a written value times `factor`, plus `offset`, is in the channel's unit."""
 
     factor: float
     offset: float = 0.0

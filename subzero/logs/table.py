@@ -1,7 +1,7 @@
 """A table of numbers from a log: columns of one length, with the units that the file writes; and the error for none.
 
 Every cell is a number. Dates and times of day are seconds, a text is a gap, and a column knows which of them it holds
-(`Column.form`). Which column is what is not decided here (`logs.names`), and no unit is converted.
+(`Column.form`). The meaning of a column is not decided here (`logs.names`), and no unit is converted.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ HEMISPHERE, SIGNS = "hemisphere", {"N": 1.0, "E": 1.0, "S": -1.0, "W": -1.0}
 HEAD, LONGEST_LINE, CHUNK = 1 << 16, 1 << 20, 20_000
 """What is looked at first [byte], the longest line [character], and rows that are converted at once."""
 SAMPLE = 100
-"""Lines that tell delimiter, decimal sign and header."""
+"""Number of lines that determine delimiter, decimal sign and header."""
 MOST_ROWS = 1_000_000
 """Of more rows only every n-th is kept: a record of ten channels then has about as much text as is read of one."""
 REMARKS = ("#", "%", "//")

@@ -127,7 +127,7 @@ def film(page: Path, out: Path, progress: Callable[[float], None] | None = None)
     Args:
         page: a ``report.html`` with a replay.
         out: the film, which ends in .gif or .mp4.
-        progress: told the fraction that is done, from 0 to 1.
+        progress: called with the fraction that is done, from 0 to 1.
 
     Raises:
         UserError: if what it takes is not installed, or the page has no replay.

@@ -1,4 +1,4 @@
-"""The page of some runs of one trial, from what is known of them."""
+"""The page of some runs of one trial, made from their results."""
 
 from __future__ import annotations
 

@@ -6,8 +6,8 @@ A series of numbers x is stored as 16-bit integers c, little-endian, in base64,
 
 so that it is known to half a step: 0.2 mm on a track of 25 m, 8 mm on one of a kilometre. Samples are left out evenly
 where there are more than a page should carry, and the cable is given at a fixed number of points, spread evenly over
-its nodes, so that what is graded finely near the vehicle stays fine. Nothing is smoothed, and nothing invented: every
-sample of the replay is one of the run.
+its nodes, so that a cable with short segments near the vehicle is shown as finely there. Nothing is smoothed, and
+nothing is invented: every sample of the replay is one of the run.
 
 Axes are north, east and down from where the vehicle starts; channels have the units of `subzero.channels`.
 """
@@ -34,7 +34,7 @@ MOST_SAMPLES, MOST_SHAPES, MOST_POINTS = 4000, 1200, 80
 """Samples of channels, shapes of the cable and points of a shape that a page carries of one run."""
 
 MISSING, LOWEST, STEPS = -32768, 32767, 65534
-"""The code for no number; what is added to a code; the steps between the lowest and the highest."""
+"""The code for no number; the number added to a code; the steps between the lowest and the highest."""
 
 HULL = ("hull", "rudder", "stern_planes", "propeller", "tow_point")
 """Sections of a vehicle's parameters that say what it looks like."""
@@ -52,8 +52,8 @@ class Actor:
     """One vehicle of a replay, with its cable if it has one.
 
     Args:
-        name: what it is called beside it.
-        run: what it does.
+        name: its label in the replay.
+        run: its motion.
         ghost: drawn translucent, behind the others.
     """
 
@@ -183,13 +183,13 @@ def _base64(values: np.ndarray) -> str:
 def as_run(record: Record, beside: xr.Dataset, used: Mapping[str, np.ndarray]) -> xr.Dataset | None:
     """Return a record as a run at its own times, to be shown as a vehicle; None if it does not say where that went.
 
-        dx/dt = R(roll, pitch, heading) (u, v, w),    from where the run beside it is at the first sample
+        dx/dt = R(roll, pitch, heading) (u, v, w), from the position of the run `beside` at the first sample
 
     Places that were measured are taken as they are; else they are reckoned so, with v and w as measured, 0 where they
     are not. A record with neither places nor speed and heading does not say where the vehicle went.
 
     Args:
-        record: what was measured.
+        record: the measured record.
         beside: a run of the same trial, which lends its fins, its propeller and the angles that were not measured.
         used: channel → which samples are no outliers, (samples,) of bool; all of them where it has none.
     """

@@ -2,7 +2,7 @@
 
 Times: a record has to lie within its trial and be long, dense and complete enough. Commands stand in the scenario, in
 the record, or in both, which then have to agree. Units: what looks like another unit is asked about, not guessed. The
-nominal simulation is the yardstick: a channel that fits it much better in another unit, or with the other sign, is
+nominal simulation is the reference: a channel that fits it much better in another unit, or with the other sign, is
 probably in that unit. A vehicle that is merely wrong is not asked about: its channel fits badly either way.
 """
 
@@ -85,7 +85,7 @@ def is_constant(values: np.ndarray) -> bool:
 
 
 def repeating(values: Mapping[str, np.ndarray]) -> list[str]:
-    """Return the channels of which most samples repeat the one before: their noise is hard to tell."""
+    """Return the channels of which most samples repeat the one before: their noise is hard to estimate."""
     return [
         name
         for name, value in values.items()
@@ -147,7 +147,7 @@ SAME_TIME_S = 1e-6
 
 
 def epoch_problems(record: Record, trial: scenarios.Trial) -> list[str]:
-    """Return what is wrong if a record begins outside its trial."""
+    """Return the problem that a record begins outside its trial, if it does."""
     first = record.time[0]
     if 0.0 <= first < trial.duration:
         return []
@@ -158,7 +158,7 @@ def epoch_problems(record: Record, trial: scenarios.Trial) -> list[str]:
 
 
 def time_problems(record: Record, trial: scenarios.Trial, *, longer: bool) -> list[str]:
-    """Return what is wrong with the times of a record; it may be `longer` than its trial if it has its own commands."""
+    """Return the problems of the times of a record; it may be `longer` than its trial if it has its own commands."""
     time, problems = record.time, epoch_problems(record, trial)
     if problems:
         return problems
@@ -255,7 +255,7 @@ def _agree(trial: scenarios.Trial, record: Record, names: list[str]) -> None:
 
 
 def _told_by(record: Record, names: list[str], trial: scenarios.Trial) -> scenarios.Trial:
-    """Return the trial with the record's commands; columns that it does not have stay the scenario's."""
+    """Return the trial with the record's commands; columns that it does not have remain those of the scenario."""
     if not names:
         wanted = ", ".join(BY_NAME[name].column for name in REPORTED_COMMANDS)
         raise UserError(

@@ -7,7 +7,7 @@ continuous (`scenarios.heading`).
 
 A heading is known but for whole turns: one compass begins at 359 degrees where another, or a run, begins at −1. So a
 run's heading is counted from its trial's start, without a jump wherever that lies, and a record's from the run's, with
-the turns of its yaw rate, or else of the run (`beside`).
+the turns of its yaw rate, or else of the run.
 
 The files that a run writes are themselves records, so one run can be compared with another.
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 YAW_RATE = "yaw_rate"
-"""The channel that tells how often a heading has turned."""
+"""The channel that shows how often a heading has turned."""
 
 GAPS = ("", "nan", "+nan", "-nan")
 """Cells that hold no measurement; numerical libraries write a NaN with either sign."""
@@ -262,7 +262,7 @@ def _meant(name: str) -> str:
 
 
 def _numbers(name: str, at: int, rows: list[Row], problems: list[str]) -> np.ndarray:
-    """Return one column as numbers; what is no number becomes a problem."""
+    """Return one column as numbers; entries that are not numbers become problems."""
     column = np.full(len(rows), np.nan)
     for index, (line, row) in enumerate(rows):
         cell = row[at]
@@ -409,7 +409,7 @@ def with_heading_of(record: Record, simulated: np.ndarray | None) -> Record:
 
 
 def _contradicted(time: np.ndarray, column: str) -> str:
-    """Return what is said of samples that contradict those around them, at these times [s]."""
+    """Return a sentence about samples that contradict those around them, at these times [s]."""
     when = f"at {time[0]:g} s" if time.size == 1 else f"between {time[0]:g} and {time[-1]:g} s"
     return (
         f"{column}: {time.size} sample{'s' * (time.size > 1)} {when} contradict{'s' * (time.size == 1)} those "

@@ -106,7 +106,7 @@ def plain_run(
         tethered: with the cable.
         run: the run.
         accuracy: how far its force can be trusted, if that is known.
-        spends: the result may take over the memory of the run's shapes: nobody looks at the run any more.
+        spends: the result may take over the memory of the run's shapes; the run is not used afterwards.
     """
     values = channel_values(run, model)
     diagnostics = _diagnostics(run, values, model)
@@ -250,10 +250,10 @@ BLOCK = 512
 
 
 def _by_node(r: Recording, packed: np.ndarray, spends: bool) -> np.ndarray:
-    """Return what is packed node by node in rows of equal length (n, nodes, …), NaN behind the last node.
+    """Return an array packed node by node in rows of equal length (n, nodes, …), NaN after the last node.
 
-    What is spent is spread where it is, for there is room behind it: a long run then needs its memory once, not twice.
-    From the last row on: no row is written to where one lies that is still to be read.
+    With `spends` the rows are spread in place, as the array has space after them: a long run then needs its memory
+    once, not twice. Rows are moved from the last one on, so that no row is written over one that is still to be read.
     """
     nodes = max(int(r.nodes.max(initial=0)), 1)
     room = packed.base if spends and packed.base is not None else packed
@@ -278,7 +278,7 @@ def _as_items(array: np.ndarray, axes: int) -> np.ndarray:
 
 
 def _diagnostics(run: Run, values: dict[str, np.ndarray], model: Model) -> dict[str, Variable]:
-    """Return what tells how far to trust the cable, row by row."""
+    """Return the variables that show how far to trust the cable, row by row."""
     r, words = run.recording, "how far the cable, summed up from the drum, ends from the tow point"
     wave = "segments of the cable that a transverse wave crosses in an exchange, at most"
     return {

@@ -220,7 +220,7 @@ def _scene(at: int, name: str, frame: str, **shapes: list[dict[str, Any]]) -> di
 
 YELLOW, ORANGE = {"r": 1.0, "g": 0.8, "b": 0.1, "a": 1.0}, {"r": 1.0, "g": 0.45, "b": 0.0, "a": 1.0}
 THICKNESS_PX = 2.0
-"""Of the cable, a few millimetres thick, which nobody would see at its own."""
+"""Drawn thickness of the cable, which at its own thickness, a few millimetres, would not be visible."""
 
 
 def _hull(run: xr.Dataset) -> dict[str, Any]:
@@ -332,7 +332,7 @@ def as_cf(run: xr.Dataset) -> xr.Dataset:
     """Return a run as CF 1.11 wants it.
 
     Forces and moments of `force_breakdown`, which share no unit, are two variables. Names along an axis are labels
-    beside it, since a coordinate has to be a number. The longest axis, time, comes last, as is recommended.
+    for it, since a coordinate has to be a number. The longest axis, time, comes last, as is recommended.
     """
     cf = run.copy()
     if "force_breakdown" in run:

@@ -230,7 +230,7 @@ def write_figures(figures: Mapping[str, Figure], output_folder: OutputFolder, ki
 
 
 def save(figure: Figure, to: Path | IO[bytes], kind: str) -> None:
-    """Write a figure to a file, or to what is open."""
+    """Write a figure to a file, by its path or open."""
     import matplotlib as mpl
 
     with mpl.rc_context(DRAWING), lacking_letters_as_boxes():

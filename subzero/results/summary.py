@@ -58,7 +58,7 @@ def summarise(run: AnyRun) -> dict[str, Any]:
 
 
 def diagnostics(run: AnyRun) -> dict[str, float | int | None] | None:
-    """Return the numbers that tell how far to trust the cable; None for a run without one.
+    """Return the numbers that show how far to trust the cable; None for a run without one.
 
     ``energy_residual`` is what the balance of all energies leaves unexplained at the end, as a share of the work and
     the losses in all; a scheme that keeps no such balance has none.
@@ -143,5 +143,5 @@ def at_end(run: AnyRun, name: str) -> float | None:
 
 
 def number(value: Any) -> float | None:
-    """Return a plain float that JSON can hold: None for what is not finite."""
+    """Return a plain float that JSON can hold: None for a number that is not finite."""
     return float(value) if math.isfinite(value) else None

@@ -38,7 +38,7 @@ DIAGNOSTIC_ROWS = {
     "smallest_tension_N": ("smallest tension in the cable [N]", "{:.4f}"),
     "newton_iterations": ("Newton iterations", "{:d}"),
 }
-"""What tells how far to trust the cable: words, and how to write the number."""
+"""Diagnostics that show how far to trust the cable: words, and how to write the number."""
 
 
 INDEX_UNITS = {
@@ -62,8 +62,8 @@ def index_in_words(name: str) -> str:
 
 
 def show(summary: Summary, console: Console, *, whole: bool = False) -> None:
-    """Print a summary, as `subzero.simulation.comparison.summary_of` gives it; the whole of it with what tells how
-    far to trust the cable, of which a warning speaks where it matters.
+    """Print a summary, as `subzero.simulation.comparison.summary_of` gives it; the whole of it with the diagnostics
+    of the cable, of which a warning speaks where it matters.
     """
     console.print(f"[bold]{escape(summary['scenario'])}[/bold]: {escape(summary['title'])}", highlight=False)
     console.print(_runs_table(summary, whole), highlight=False)
@@ -160,7 +160,7 @@ def _energy_rows(balances: list[Summary]) -> list[Row]:
 
 
 def _diagnostic_rows(found: list[Summary]) -> list[Row]:
-    """Return what tells how far to trust the cable; nothing where there is no cable."""
+    """Return the diagnostics that show how far to trust the cable; none where there is no cable."""
     return [
         (words, *(NOTHING if (x := each.get(key)) is None else form.format(x) for each in found))
         for key, (words, form) in DIAGNOSTIC_ROWS.items()

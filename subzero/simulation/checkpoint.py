@@ -60,7 +60,7 @@ class Checkpoint:
     minutes: float = 5.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no time."""
+        """Raise an error if the interval is not valid."""
         object.__setattr__(self, "minutes", checked("Checkpoint", "minutes", self.minutes, least=0.0))
         object.__setattr__(self, "folder", Path(self.folder))
 
@@ -73,7 +73,7 @@ class Checkpoint:
             return None
 
     def remove(self) -> None:
-        """Remove its files, when the result is safe; others that are in the folder stay."""
+        """Remove its files, when the result is safe; other files in the folder are kept."""
         for manifest in Path(self.folder).glob(f"*/{MANIFEST}"):
             shutil.rmtree(manifest.parent)
         with suppress(OSError):
@@ -110,7 +110,7 @@ class KeptRun:
         folder.mkdir(exist_ok=True)
 
     def go_on(self, started: RunState) -> RunState:
-        """Return where the run stands that was kept here; what has `begun` where none was."""
+        """Return the saved state of the run; the given start if none was saved."""
         if not self._path.exists():
             return started
         state = _read(self._path)
@@ -160,7 +160,7 @@ def _filled(now: RunState, stride: int) -> dict[str, np.ndarray]:
 
 
 def _recording(started: RunState, counts: Mapping[str, int], state: Mapping[str, np.ndarray]) -> Recording:
-    """Return a recording with what was kept of it, and room for the rest."""
+    """Return a recording with the saved rows, and space for the rest."""
     rows, times = started.recording.state.shape[0], started.recording.trace.shape[0]
     if not fits(BYTES_A_NODE * counts["room"]) or counts["behind"] > times or counts["used"] > counts["room"]:
         raise DamagedError("it has more rows than its run")
@@ -183,7 +183,7 @@ def _count(arrays: Mapping[str, np.ndarray], name: str) -> int:
 
 
 def _capacity(started: RunState, state: Mapping[str, np.ndarray]) -> int:
-    """Return for how many segments the kept line has room: at least as many as at the start."""
+    """Return the number of segments that the saved line has space for: at least as many as at the start."""
     name = "live.line.length"
     check_arrays(state, {name: (np.dtype(float), state[name].shape[:1])})
     return max(state[name].size, started.live.line.length.size) - 1

@@ -140,7 +140,7 @@ def start_at_drum(setup: Setup, live: Live, w: BoxWorkspace) -> None:
 
 @compiled
 def pull_of(w: BoxWorkspace) -> tuple[float, float, float]:
-    """Return the force on the vehicle (12), earth axes; none from a drum that has not begun to turn. [N]."""
+    """Return the force on the vehicle (12), earth axes; none from a drum that does not turn yet. [N]."""
     if w.count[0] == 1 and abs(w.y[0, 1]) <= NOTHING:
         return 0.0, 0.0, 0.0
     return node_force(w, 0)

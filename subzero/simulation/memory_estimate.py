@@ -1,4 +1,4 @@
-"""How much memory a run will need, told before it is asked for.
+"""How much memory a run will need, estimated before it is allocated.
 
 What grows is the cable's shape, kept at every step: the way that the tow point goes is estimated from below, so that
 only runs are refused that cannot fit; one that nevertheless outgrows the memory stops and keeps what it has.
@@ -82,7 +82,7 @@ def segments_of(trial: scenarios.Trial, length: float) -> int:
 def with_fewer_results(trial: scenarios.Trial, model: Model, tethered: bool) -> scenarios.Trial:
     """Return a trial that keeps as many results as take `MOST_KEPT`, if it leaves open how many it wants (`every` 0).
 
-    One whose results take less, and one that says how many it wants, stays as it is.
+    A trial whose results take less, or that states how many it wants, is not changed.
     """
     if trial.every > 0.0:
         return trial
@@ -95,7 +95,7 @@ def with_fewer_results(trial: scenarios.Trial, model: Model, tethered: bool) -> 
 
 
 def thinning_notice(trial: scenarios.Trial) -> str:
-    """Return what a run tells whose results are fewer than there are steps, unasked."""
+    """Return the notice of a run that keeps fewer results than steps without being asked to."""
     step = f"{trial.cable_step:g}"
     return (
         f"Results are kept every {trial.every:g} s of this long run: all would take more than {MOST_KEPT / 1e6:g} MB. "
@@ -122,7 +122,7 @@ def refuse_what_cannot_fit(trial: scenarios.Trial, model: Model, tethered: bool,
         nodes = [1 + segments_of(trial, length) for length in lengths]
         size += (
             rows * BYTES_A_NODE * (0.5 * sum(nodes) + max(nodes))
-        )  # the result has room for the most at all times
+        )  # the result is padded to the largest number of nodes at all times
     kept = f", kept every {trial.every:g} s," if grid.stride > 1 else ","
     refuse_unless_it_fits(
         size, f"'{trial.name}', {trial.duration:g} s in steps of {trial.cable_step:g} s{kept}", REMEDY

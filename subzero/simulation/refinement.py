@@ -22,7 +22,7 @@ numbers on every machine. A run of an ill-posed problem takes ever more iteratio
 its refinement soon; then the last change is the error, and the run says that it is not resolved.
 
 That looks at the whole error, of segments, steps, slack and coupling alike, which an estimate inside a step does not: a
-cable that is bent sharply beside the drum errs in its segments only, and its steps look perfect.
+cable that is bent sharply near the drum errs in its segments only, and its steps look perfect.
 """
 
 from __future__ import annotations
@@ -55,11 +55,11 @@ START_ROWS, START_REFINEMENTS = 5, (4, 2)
 """Samples that belong to the start, and how much finer these are taken to see their error: half as fine where a run of
 a stiff cable does not get so far. [-]"""
 SMALLEST_FORCE = 1e-6
-"""Forces are compared with at least this: what is smaller means nothing. [N]"""
+"""Forces are compared with at least this: smaller ones have no meaning. [N]"""
 
 Progress = Callable[[float], None]
 Take = Callable[[scenarios.Trial, Grid, Progress | None], "Run"]
-"""(trial, its times and what is kept, progress) → a run."""
+"""(trial, its times and the rows to keep, progress) → a run."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +70,7 @@ class Accuracy:
         force_error: of the force, as a share of its largest; infinite where another resolution could not go on. [-]
         change: largest change of the force from the resolution before to this one, after the start, as that share. [-]
         time: when it changes most. [s]
-        start_error: of the force in the first samples, beside a run that is finer still, as that share. [-]
+        start_error: of the force in the first samples, from a run that is finer still, as that share. [-]
         start_time: when that is largest. [s]
         halvings: how often steps and segments were halved.
         rtol: what was asked for. [-]
@@ -153,9 +153,9 @@ class Budget:
             take: makes a run.
             like: a run whose nodes are known.
             finer: how many times as fine as that the trial is; a run takes the square as long, or more.
-            trial: what is run; None beyond the limits of a trial.
-            grid: its times and what is kept.
-            progress: told the fraction that is done.
+            trial: the trial to run; None beyond the limits of a trial.
+            grid: its times and the rows to keep.
+            progress: called with the fraction that is done.
         """
         times = grid.times.size / like.all_times.size  # the start alone has few of them
         if trial is None or not self.allows(like, finer, times):
@@ -178,7 +178,7 @@ def run_converged(
         trial: a tethered one of the default scheme.
         take: makes a run.
         budget: of the finer runs; granted here.
-        progress: told the fraction that is done; it goes back where a run is repeated.
+        progress: called with the fraction that is done; it goes back where a run is repeated.
 
     Returns:
         the run, with rows at the times of the trial however fine it is; and its accuracy, None for one too short.
@@ -226,12 +226,12 @@ def prove(
         accuracy: of the run.
         finest: one of `PROOFS`.
         budget: what `run_converged` has left of it.
-        progress: told the fraction that is done of each run.
+        progress: called with the fraction that is done of each run.
 
     Returns:
-        the accuracy with the error that was found, where all of them agree or one contradicts. The error stays as it
-        was where the budget does not allow the finest, as far as the one before tells, and where one of them is refused
-        or does not reach the end: that proves nothing.
+        the accuracy with the error that was found, where all of them agree or one contradicts. The error is not
+        changed where the budget does not allow the finest, as far as the one before shows, and where one of them is
+        refused or does not reach the end: that proves nothing.
     """
     latest, reached, worst, given = run, 1, 0.0, 2**accuracy.halvings
     for finer in PROOFS[: PROOFS.index(finest) + 1]:
@@ -259,7 +259,7 @@ def _only_traced(times: np.ndarray, parts: int) -> Grid:
 
 
 def _taken(take: Take, trial: scenarios.Trial, grid: Grid, progress: Progress | None) -> Run | None:
-    """Return a run beside the one that was asked for; None where it is refused, for memory or a start that fails."""
+    """Return a run other than the requested one; None where it is refused, for memory or a start that fails."""
     try:
         return take(trial, grid, progress)
     except UserError:

@@ -81,7 +81,7 @@ def simulate(
             `subzero.simulation.memory_estimate.MOST_KEPT`; ``attrs["thinned"]`` then says so.
         checkpoint: keeps where the run stands, now and then; the same call then goes on from there, and gives the same
             result, to the last bit.
-        progress: told the fraction that is done.
+        progress: called with the fraction that is done.
 
     Returns:
         one variable per channel of `subzero.channels`, the force breakdown, the cable's shape and tensions; units on
@@ -174,7 +174,7 @@ def simulate_many(
         tethered: with the cable.
         every: time between results that are kept, as of `simulate`. [s]
         workers: how many threads; one for each processor if not given.
-        progress: told the fraction that is done.
+        progress: called with the fraction that is done.
 
     Returns:
         what `simulate` gives for each trial, in their order, the same to the last bit.
@@ -234,12 +234,12 @@ def run_trial(
     """Run a trial with steps and segments as they are, in plain arrays.
 
     Args:
-        trial: what is run.
+        trial: the trial to run.
         model: vehicle, cable, drum and water.
         tethered: with the cable.
-        progress: told the fraction that is done.
+        progress: called with the fraction that is done.
         later: times of rows and the models that hold from them on.
-        grid: its times and what is kept; as the trial says when not given.
+        grid: its times and the rows to keep; by default those of the trial.
         keeper: keeps where the run stands, now and then, so that it can go on from there.
     """
     grid = Grid(trial.times(), 1, trial.stride) if grid is None else grid
@@ -292,10 +292,10 @@ def _took_too_long(now: RunState, grid: Grid) -> bool:
 
 
 ROOM = 64
-"""A run begins with room for so many segments beyond those in the water, more than `fig6` pays out: to enlarge it takes
-half a millisecond. [-]"""
+"""Segments allocated for a run at its start beyond those in the water, more than `fig6` pays out: to enlarge the
+arrays takes half a millisecond. [-]"""
 SPARE_NODES = 64
-"""A recording has room for twice the nodes that are expected, and so many more in each row. [-]"""
+"""A recording has space for twice the nodes that are expected, and so many more in each row. [-]"""
 
 
 def _begun(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> RunState:
@@ -318,7 +318,7 @@ def _further(now: RunState, grid: Grid, last: int) -> RunState:
 
 
 def enlarged_run(live: Live, recording: Recording, used: int) -> tuple[Live, Recording]:
-    """Return the same run with twice the room for nodes."""
+    """Return the same run with space for twice as many nodes."""
     capacity = 2 * live.line.length.size
     nodes = 2 * max(recording.tension.size, used + 64 * capacity)
     larger = {}

@@ -51,9 +51,9 @@ WELL = (coupling.FINE, NO_ROOM)
 
 
 class Held(NamedTuple):
-    """A run: its arrays, times of its rows (n,) [s], where it stands (`subzero.engine.time_loop`), what is seen,
-    and the handle that machine code knows the arrays by. It is exchanged as a whole: an interrupt finds the old one
-    or the new one.
+    """A run: its arrays, times of its rows (n,) [s], its position in time (`subzero.engine.time_loop`), its
+    observation, and the handle that machine code knows the arrays by. It is exchanged as a whole: an interrupt finds
+    the old one or the new one.
     """
 
     setup: Setup
@@ -90,10 +90,10 @@ class Simulator:
     """A run that waits for the next command.
 
     Attributes:
-        trial: what is simulated; it goes on beyond the trial's duration if asked to.
+        trial: the trial to simulate; the run goes on beyond its duration if asked to.
         model: vehicle, cable, drum and water.
         sample_time: how long a step lasts. [s]
-        observation: what is true now.
+        observation: the true values now.
     """
 
     @checked_arguments
@@ -124,7 +124,7 @@ class Simulator:
         self.reset()
 
     def reset(self) -> Observation:
-        """Go back to the start, and return what is true there."""
+        """Return to the start; return the observation there."""
         setup, live = prepare(self.trial, self.model, self._tethered)
         setup = setup._replace(orders=Orders(np.zeros(1), np.zeros((1, 4))))
         setup.orders.values[0] = self._command_at(0.0)
@@ -149,7 +149,7 @@ class Simulator:
         return float(self._held.seen[0])
 
     def step(self, command: Command | None = None) -> Observation:
-        """Hold a command for one sample time, and return what is true then.
+        """Hold a command for one sample time; return the observation after it.
 
         Args:
             command: propeller [rev/s], rudder, port and starboard stern-plane [rad]; None: what the scenario commands
@@ -223,7 +223,7 @@ class Simulator:
 
 
 def _with_rows(held: Held, goal: int) -> Held:
-    """Return a run with room for rows up to `goal`, and for twice as many as there were."""
+    """Return a run with space for rows up to `goal`, and for twice as many as there were."""
     old, times = held.recording, held.times
     rows = max(2 * times.size, goal + 1)
     new = new_recording(rows, old.tension.size)

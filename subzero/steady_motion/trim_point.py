@@ -3,11 +3,11 @@
     ν'(n, δ_r, δ_e, δ_d, θ, v, w) = 0,   z' = depth rate,   (p, q, r) = J⁻¹ (0, 0, ψ')
 
 Seven equations, seven unknowns; the roll angle is asked for (0) and held by unlike stern-planes. Propeller and fins
-are solved for without their limits first, if need be in steps from straight level motion to what is asked for: so a
-motion that cannot be had is told with the limit that is in its way. Speeds are through the water; a uniform current
-only carries the track.
+are solved for without their limits first, if necessary in steps from straight level motion to the requested one: a
+motion that is impossible is then reported with the limit that excludes it. Speeds are through the water; a uniform
+current only carries the track.
 
-A motion that cannot be had is refused with what is in the way, and how far one can go (`NoTrimError`).
+A motion that is impossible is refused with the reason, and the largest motion that is possible (`NoTrimError`).
 
 The force of the cable in steady motion is (`SteadyPull`)
 
@@ -178,7 +178,7 @@ class Motion:
         return x
 
     def left(self, y: np.ndarray) -> np.ndarray:
-        """Return what is left of the seven equations."""
+        """Return the residual of the seven equations."""
         x = self.state(y)
         rates = rate(x, x[12:], self.numbers, self.pull.wrench(x[VELOCITY]) + self.extra)
         return np.append(rates[VELOCITY], rates[DEPTH] - self.asked.depth_rate)
@@ -270,7 +270,7 @@ class Trim:
 
 
 Pull = Callable[[np.ndarray, Asked], np.ndarray]
-"""(state (16,), what is asked for) → wrench of the cable (6,), body axes [N, N m]."""
+"""(state (16,), requested motion) → wrench of the cable (6,), body axes [N, N m]."""
 
 
 def steady_motion(model: Model, asked: Asked, pull_of: Pull | None = None) -> Trim:

@@ -54,7 +54,7 @@ class SweepProgress:
 
 
 Progress = Callable[[SweepProgress], None]
-"""Told after every batch how far the sweep is."""
+"""Called after every batch with the progress of the sweep."""
 
 
 @checked_arguments
@@ -77,12 +77,12 @@ def sweep(
 
     Args:
         scenario: name of a shipped scenario, path of a scenario file, a trial, or a whole plan (`plan_sweep`).
-        parameters: their values, as of `plan_sweep`; none beside a plan, which has them.
+        parameters: their values, as of `plan_sweep`; not with a plan, which has them.
         out: folder that keeps the members. The same call with it goes on where another was killed; without one, nothing
             is kept.
         workers: processes on this machine, by default one for each of its cores; or a `concurrent.futures.Executor`.
         client: Dask client to run on instead.
-        progress: told after every batch how far it is.
+        progress: called after every batch with the progress.
         **how: `design`, `changes`, `kept`, `tethered`, `description`, as of `plan_sweep`.
 
     Returns:
@@ -148,7 +148,7 @@ def finished(
         retry: run members again that failed.
 
     Raises:
-        UserError: as of `sweep`, or workers that cannot go on; what is finished is kept.
+        UserError: as of `sweep`, or workers that cannot go on; finished members are kept.
     """
     check_workers(workers)  # before there is a folder
     job, rows = plan.job, plan.points.values
@@ -165,7 +165,7 @@ def finished(
 
 
 class _Tally:
-    """Keeps members, and tells how far the sweep is."""
+    """Keeps members, and reports the progress of the sweep."""
 
     def __init__(self, store: Store, members: int, finished: int, progress: Progress | None) -> None:
         self._store, self._members, self._progress = store, members, progress
@@ -204,7 +204,9 @@ class _Tally:
 
 
 def deliver(plan: Plan, store: Store, folder: Path) -> Gathered:
-    """Write the dataset of a finished sweep to a folder, whole or not at all; return what is looked at."""
+    """Write the dataset of a finished sweep to a folder, whole or not at all; return the data for figures and
+    page.
+    """
     with tempfile.TemporaryDirectory(prefix=".subzero-", dir=folder) as hidden:
         found = write_result(store, plan.job, plan.points, plan.attributes, Path(hidden))
         for path in sorted(Path(hidden).iterdir()):

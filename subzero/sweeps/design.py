@@ -90,7 +90,7 @@ def spreads_of(trial: scenarios.Trial, parameters: Mapping[str, Any]) -> tuple[S
     """Return the spreads that a plan asks for; ``vehicle.*`` stands for all of that name that are declared.
 
     Raises:
-        UserError: a name that the trial does not have, or what is no spread.
+        UserError: a name that the trial does not have, or an invalid spread.
     """
     if not isinstance(parameters, Mapping) or not parameters:
         raise UserError(
@@ -106,7 +106,7 @@ def spreads_of(trial: scenarios.Trial, parameters: Mapping[str, Any]) -> tuple[S
 
 
 def _expanded(trial: scenarios.Trial, parameters: Mapping[str, Any]) -> Any:
-    """Give names and what is said of them, patterns such as ``vehicle.*`` spelt out."""
+    """Return names and their values, with patterns such as ``vehicle.*`` expanded."""
     for name, said in parameters.items():
         if not isinstance(name, str):
             raise UserError(f"A parameter is named {short(name)}. Allowed: a name such as 'cable.diameter'.")
@@ -392,7 +392,7 @@ class Design:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what is no design."""
+        """Raise an error if the fields do not form a design."""
         chosen(DESIGNS, self.kind, "design")
         object.__setattr__(self, "seed", whole("seed", self.seed))
         _samples(self.kind, self.samples)
@@ -405,7 +405,7 @@ def points_of(trial: scenarios.Trial, parameters: Mapping[str, Any], design: Des
     """Return the points of a plan.
 
     Args:
-        trial: what is swept.
+        trial: the trial to sweep.
         parameters: dotted name → spread, as this module says.
         design: which points.
 

@@ -59,9 +59,9 @@ class Job:
     """What a worker needs to run members.
 
     Attributes:
-        trial: what is swept, with all changes that hold for every member.
+        trial: the trial to sweep, with all changes that hold for every member.
         names: of the parameters that change.
-        outcomes: what is kept.
+        outcomes: the outcomes to keep.
         tethered: with the cable.
         code: digest of the sources that the sweep was planned with.
     """
@@ -92,7 +92,7 @@ class Job:
         return simulate_plainly(trial, tethered=self.tethered), {}
 
     def _seen(self, index: int, run: PlainRun, indices: dict[str, float], started: float) -> Member:
-        """Return what is kept of a run."""
+        """Return the outcomes of a run that are kept."""
         warned = tuple(
             (load["check"], load["message"]) for load in json.loads(run.attrs.get("warnings", "[]"))
         )

@@ -135,16 +135,16 @@ class Outcomes:
         return math.floor(self.until / self.every + 1e-9) + 1 if self.channels else 0
 
     def digest(self) -> str:
-        """SHA-256 of all that says what is kept; of a function its code, not what it calls."""
+        """SHA-256 of all settings of the outcomes; of a function its code, not the functions it calls."""
         parts = (self.scalars, self.channels, self.every, self.until, text_of(self.function))
         return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 
 def outcomes_of(kept: Kept, duration: float) -> Outcomes:
-    """Return what is kept, checked.
+    """Return the outcomes to keep, checked.
 
     Args:
-        kept: what is asked for.
+        kept: the outcomes that are asked for.
         duration: of the nominal run. [s]
 
     Raises:
@@ -256,7 +256,7 @@ def own_numbers(run: PlainRun, function: Function | None) -> dict[str, float]:
     """Return what a function of one's own makes of a run, labelled for it; numbers by name.
 
     Raises:
-        UserError: it returned what is no number, nor numbers by name.
+        UserError: it returned neither a number nor numbers by name.
     """
     if function is None:
         return {}

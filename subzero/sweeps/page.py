@@ -33,9 +33,9 @@ COLUMNS = {
 }
 """Statistics of a scalar, and what they are called."""
 SHOWN_EFFECTS = 5
-"""So many parameters are told for each scalar. [-]"""
+"""Number of parameters that are named for each scalar. [-]"""
 IN_WORDS = 4
-"""So many parameters or scalars are told in a sentence of their own; the tables have all of them. [-]"""
+"""Number of parameters or scalars with a sentence of their own; the tables have all of them. [-]"""
 NOTHING = "–"
 LIBRARIES = ("numpy", "numba", "scipy", "xarray")
 

@@ -44,7 +44,7 @@ class Batch:
 
 @dataclass
 class Schedule:
-    """What is still to be done, and what is under way.
+    """The batches still to be done, and those in progress.
 
     Attributes:
         job: the sweep.
@@ -80,7 +80,7 @@ class Schedule:
                 future.cancel()
 
     def _fill(self, executor: Executor) -> bool:
-        """Hand out batches as long as there is room; return whether anything is under way."""
+        """Submit batches as long as there is capacity; return whether any is in progress."""
         while len(self._under_way) < AHEAD * self.workers and (batch := self._batch()) is not None:
             try:
                 future = executor.submit(

@@ -100,8 +100,8 @@ def _correlations(points: Points, name: str, values: np.ndarray) -> list[Effect]
 
 
 def _ranks(values: np.ndarray) -> np.ndarray:
-    """Return the rank of each value (n,) from 1, equal ones sharing the mean: what `scipy.stats.rankdata` does, whose
-    import takes longer than all else that is told of a sweep.
+    """Return the rank of each value (n,) from 1, equal ones sharing the mean, as `scipy.stats.rankdata` does, whose
+    import takes longer than everything else that is computed for a sweep here.
     """
     _, which, counts = np.unique(values, return_inverse=True, return_counts=True)
     shared: np.ndarray = (np.cumsum(counts) - 0.5 * (counts - 1.0))[which]

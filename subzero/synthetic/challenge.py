@@ -1,4 +1,4 @@
-"""Hide an effect in a record, drawn from a seed: every number from its tolerance, and what is hidden among them."""
+"""Hide an effect in a record, drawn from a seed: every number from its tolerance, and the effect among them."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ KIND_PROBABILITIES = {"none": 0.2, "single": 0.4, "sudden": 0.1, "pair": 0.15, "
 
 @dataclass(frozen=True, kw_only=True)
 class Challenge:
-    """A record, the trial with the nominal model, what is true, and what is hidden."""
+    """A record, the trial with the nominal model, the true setting, and the hidden effects."""
 
     record: Record
     nominal: Setting
@@ -76,7 +76,7 @@ def challenge(
     """Return a record with something hidden in it, drawn from a seed; written to a folder if one is given.
 
     Args:
-        scenario: what is flown.
+        scenario: the scenario to fly.
         seed: draws everything.
         folder: for ``record.csv``, ``record.toml`` and the sealed answer.
         kind: what to hide, one of KIND_PROBABILITIES; drawn if None.
@@ -122,7 +122,7 @@ def _answer(
     scenario: str,
     seed: int,
 ) -> Answer:
-    """Return what is hidden, ready to be told."""
+    """Return the hidden effects as an answer in words."""
     outside = hidden.outside
     kind = (
         "outside"
@@ -149,7 +149,7 @@ def _answer(
 
 
 def write(made: Challenge, folder: Path, scenario: str | Path | scenarios.Trial) -> None:
-    """Write the record with its commands, what is known of it, and the sealed answer."""
+    """Write the record with its commands, its metadata, and the sealed answer."""
     folder.mkdir(parents=True, exist_ok=True)
     _write_csv(made, folder / "record.csv")
     lines = [f"source = {json.dumps(made.record.source, ensure_ascii=False)}", 'surge_speed = "water"']

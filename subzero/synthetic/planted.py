@@ -27,12 +27,12 @@ MAX_DRAWS = 1000
 
 @dataclass(frozen=True, kw_only=True)
 class Hidden:
-    """What is wrong with a vehicle.
+    """The faults of a vehicle.
 
     Attributes:
         effects: effect id → deviations, on top of what the tolerances draw.
         starts: effect id → when it begins, of those that begin in mid-run. [s]
-        outside: a force outside the catalogue.
+        outside: a force that is not in the catalogue.
     """
 
     effects: Deviations = field(default_factory=dict)
@@ -41,7 +41,7 @@ class Hidden:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names as a diagnosis tells them: ids, ``<id>@t`` for one that begins in mid-run, ``outside:<kind>``."""
+        """Names as in a diagnosis: ids, ``<id>@t`` for one that begins in mid-run, ``outside:<kind>``."""
         ids = tuple(f"{key}@t" if key in self.starts else key for key in self.effects)
         return ids + ((f"outside:{self.outside.name}",) if self.outside else ())
 
@@ -163,7 +163,7 @@ def make_record(
     simulate: Simulate = simulate_reference,
     source: str = "simulated",
 ) -> Record:
-    """Return what is measured in a setting.
+    """Return the measurements of a setting.
 
     Args:
         setting: the truth.

@@ -27,7 +27,7 @@ NEARLY_AGREED_N = 1e-3
 """In the smallest piece of an exchange, they need not agree better than this. [N]"""
 SMALLEST_SHARE = 0.5**10
 RATE_STEP_S = 1e-4
-"""To tell how fast a winch's setpoint changes. [s]"""
+"""Time step of the difference that gives the rate of a winch's setpoint. [s]"""
 
 FINE, CABLE, NOT_AGREED = range(3)
 """How an exchange ended."""

@@ -58,7 +58,7 @@ def seen(setting: Setting, truth: Truth, times: np.ndarray, channels: Iterable[s
 
 
 def _true(name: str, setting: Setting, truth: Truth) -> np.ndarray:
-    """Return what is true of a channel at the times of the run (n,), in its display unit."""
+    """Return the true values of a channel at the times of the run (n,), in its display unit."""
     r, scale = truth.run.recording, BY_NAME[name].scale
     if name in STATE:
         return scale * r.state[:, STATE[name]]
@@ -116,7 +116,7 @@ def _sensor(sensor: Sensing, grid: np.ndarray, truth: np.ndarray) -> np.ndarray:
 
 
 FASTEST = 2.0
-"""Room for cable is made for this speed. [m/s]"""
+"""Space for cable is allocated for this speed. [m/s]"""
 
 
 class NoTruthError(UserError):

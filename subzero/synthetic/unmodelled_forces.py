@@ -1,7 +1,7 @@
-"""Forces that happen to vehicles and are in no catalogue, to plant in a record: none that a cause can name.
+"""Unmodelled forces that act on vehicles and are in no catalogue, to plant in a record: no cause can name them.
 
 Each kind draws its size and times, and says which axis it acts on and, where there is one, which feature of
-`subzero.external_force` its formula has. Sizes are told in the drag of the hull at 1 m/s, so they fit any vehicle.
+`subzero.external_force` its formula has. Sizes are shares of the drag of the hull at 1 m/s, so they fit any vehicle.
 
 To add a kind: a function (draw) → `UnmodelledForce`, and a line in KINDS.
 """
@@ -20,7 +20,7 @@ from subzero.synthetic.reference_run import Truth
 
 @dataclass(frozen=True, kw_only=True)
 class UnmodelledForce:
-    """A force outside the catalogue.
+    """A force that is not in the catalogue.
 
     Attributes:
         name: of its kind.
@@ -273,7 +273,7 @@ ALSO_CAUSES = {"leak": "flooding", "fouling_grows": "fouling"}
 def draw_unmodelled(
     setting: Setting, seed: int | np.random.Generator, kind: str | None = None
 ) -> UnmodelledForce:
-    """Return a force outside the catalogue, of a kind or of any."""
+    """Return a force that is not in the catalogue, of a given kind or of any."""
     rng, hull = np.random.default_rng(seed), setting.model.vehicle
     name = kind or str(rng.choice(list(KINDS)))
     force = abs(hull.numbers().axial_drag)

@@ -78,11 +78,11 @@ class _Supposed:
 
 @checked_arguments
 def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -> int:
-    """Return how much finer a run would have to confirm the tow force so that no number is doubted any more.
+    """Return how much finer a run would have to confirm the tow force so that no doubt of a number remains.
 
-    0 if none is, if another doubt would be left all the same, if finer runs of the start contradict it already, or if
-    the run stopped. A cable of which nothing says how it leaves its drum, and an error that is close to what is
-    allowed, are no doubts yet, but looked at all the same.
+    0 if no number is doubted, if another doubt would remain anyway, if finer runs of the start contradict it already,
+    or if the run stopped. Two cases are not doubts yet, but are checked as well: a cable without a determined
+    direction at its drum, and an error that is close to the allowed one.
     """
     if run.attrs["outcome"] != "completed" or starts_otherwise(run):
         return 0

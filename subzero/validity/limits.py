@@ -65,7 +65,7 @@ def above_surface(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
 
 
 def below_sea_bed(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
-    """Vehicle or cable below the sea bed that the trial tells."""
+    """Return warnings of a vehicle or cable below the sea bed of the trial."""
     if trial.sea_bed <= 0.0:
         return []
     words = "which no equation knows: nothing holds it up there. Change the trial, or water.sea_bed_m."
@@ -170,7 +170,7 @@ def actuators(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
 
 
 def _fin(run: AnyRun, model: Model, fin: str) -> list[str]:
-    """Return what is wrong with a fin: cut off, at its limit, or turning as fast as it can all the time."""
+    """Return the warnings of a fin: cut off, at its limit, or turning as fast as it can all the time."""
     time, servo = run["time"].values, getattr(model.vehicle, FINS[fin])
     command, angle = run[f"{fin}_command"].values, run[f"{fin}_angle"].values
     name, limit = fin.replace("_", " "), servo.deflection_limit * DEGREE
@@ -196,7 +196,7 @@ def _fin(run: AnyRun, model: Model, fin: str) -> list[str]:
 
 
 def _propeller(run: AnyRun, model: Model) -> list[str]:
-    """Return what is wrong with the propeller: asked for too much, or behind its command."""
+    """Return the warnings of the propeller: a command above its limit, or a speed that lags its command."""
     time, c = run["time"].values, model.vehicle.motor.speed_per_volt
     command, speed = run["propeller_command"].values, run["propeller_speed"].values
     most = c * model.vehicle.battery.full_voltage

@@ -126,7 +126,7 @@ def _start_imbalance(run: AnyRun, trial: scenarios.Trial, model: Model) -> str:
 
 
 def _share(number: float | None) -> float:
-    """Return a number of an accuracy; what is infinite stands as None in it."""
+    """Return a number of an accuracy; an infinite one is stored as None in it."""
     return np.inf if number is None else number
 
 
@@ -270,14 +270,15 @@ def drum_is_ill_posed(
     cable: CableProperties,
     drum: DrumProperties,
 ) -> np.ndarray:
-    """Say when a free drum does not hold its cable: it unwinds itself, or nothing says in which direction it goes.
+    """Return when a free drum does not hold its cable: it unwinds itself, or the direction of the cable is
+    undetermined.
 
         T(S) ≤ C_f/R_d,  U > 1.2 V                     it unwinds: its weight pulls, not the tow point
         T(S) < m1 U²,    |w_c| > 0.2 ½ρπdC_t U²        it swings: it is faster than its own waves
 
-    In the second case all waves along the cable go away from the drum, so that nothing tells the direction in which it
-    leaves; its weight turns it, unless its drag straightens it within the first m1/(½ρπdC_t) metres. Segments as long
-    as that hide it: then a finer run is worse.
+    In the second case all waves along the cable go away from the drum, so that the direction in which it leaves the
+    drum is not determined; its weight turns it, unless its drag straightens it within the first m1/(½ρπdC_t) metres.
+    Segments as long as that hide it: then a finer run is worse.
 
     Args:
         tension: T(S) at the drum (samples,). [N]
