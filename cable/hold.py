@@ -149,7 +149,7 @@ def _checked_ends(ends: Sequence[Place] | np.ndarray) -> np.ndarray:
 
 
 def _positive(name: str, given: object) -> float:
-    """Return a length as a float [m]; raise an error if it is not positive and finite."""
+    """Return a length as a float [m]; raise an error if it is not a positive number."""
     length = real(given)
     if length is None or length <= 0.0:
         message = f"hold: {name} is {short(given)}; it must be a positive number of metres."

@@ -124,7 +124,7 @@ class Checks:
         object.__setattr__(self._value, name, value)
 
     def freeze(self, name: str, array: np.ndarray) -> None:
-        """Keep a read-only copy of an array as the field."""
+        """Keep an array as the field, read-only, so that it cannot be changed unseen."""
         array.setflags(write=False)
         self._keep(name, array)
 

@@ -42,6 +42,7 @@ def _bend(line: Line, stiffness: float) -> None:
                 line.blocks[UPPER2, j, i, k] = 0.0
     tangents, chords = np.empty((3, 3)), np.empty(3)
     for j in range(1, line.ends.count + 1):
+        # Segments j−1, j and j+1; those beyond the ends get zero tangents, and no moment.
         for side in range(3):
             _tangent(line, j + side - 1, side, tangents, chords)
         _add_shear(line, j, stiffness, tangents, chords)
@@ -66,6 +67,7 @@ def _spring(line: Line, j: int, stiffness: float) -> float:
     N = line.ends.count
     if j < 1 or j >= N:
         return 0.0
+    # The length of level NOW, since ℓ̄ of the growing segment is taken from the step before.
     far = line.ends.last_length[NOW] if j + 1 == N else line.length[j + 1]
     return 2.0 * stiffness / (line.length[j] + far)
 
@@ -79,6 +81,7 @@ def _add_shear(line: Line, j: int, stiffness: float, t: np.ndarray, r: np.ndarra
         m[i] = far * (t[2, i] - t[1, i]) - near * (t[1, i] - t[0, i])
         along += t[1, i] * m[i]
     for i in range(3):
+        # The part of m along the tangent is not a shear force.
         q[i] = (m[i] - along * t[1, i]) / r[1]
         _add_to_balances(line, j, i, q[i])
     before_after_0, before_after_2 = 0.0, 0.0
@@ -87,6 +90,7 @@ def _add_shear(line: Line, j: int, stiffness: float, t: np.ndarray, r: np.ndarra
         before_after_2 += t[1, i] * t[2, i]
     for i in range(3):
         for k in range(3):
+            # P projects onto the plane across segment j; A, B and C are derivatives by the chords j−1, j and j+1.
             P = (1.0 if i == k else 0.0) - t[1, i] * t[1, k]
             to_0 = P - t[0, k] * (t[0, i] - t[1, i] * before_after_0)
             to_2 = P - t[2, k] * (t[2, i] - t[1, i] * before_after_2)
@@ -98,6 +102,7 @@ def _add_shear(line: Line, j: int, stiffness: float, t: np.ndarray, r: np.ndarra
 @compiled
 def _add_to_balances(line: Line, j: int, i: int, q: float) -> None:
     """Add a component of q_j: −q to node j, +q to node j−1, −q to the tow force."""
+    # The place of the held node is known: it has no balance.
     if j < held_node(line):
         line.rows[RESIDUAL, j, 1 + i] -= q
     if j > 1:
@@ -110,6 +115,7 @@ def _add_to_balances(line: Line, j: int, i: int, q: float) -> None:
 def _add_to_matrix(line: Line, j: int, i: int, k: int, A: float, B: float, C: float) -> None:
     """Add the derivatives of a component of q_j by the chords j−1 (A), j (B) and j+1 (C)."""
     held, row, column = held_node(line), 1 + i, 1 + k
+    # A chord is the difference of two nodes, so a derivative by a chord enters the columns of both.
     if j < held:
         line.blocks[LOWER2, j, row, column] += A
         line.blocks[LOWER, j, row, column] += B - A

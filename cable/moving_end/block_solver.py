@@ -40,9 +40,8 @@ def factor_block(D: np.ndarray, pivots: np.ndarray) -> bool:
     """
     for k in range(SIZE):
         best = k
-        for i in range(
-            k + 1, SIZE
-        ):  # the largest entry of a column is its pivot: this keeps rounding errors small
+        # The largest entry of a column is its pivot: this keeps rounding errors small.
+        for i in range(k + 1, SIZE):
             if abs(D[i, k]) > abs(D[best, k]):
                 best = i
         pivots[k] = best
@@ -113,17 +112,15 @@ def solve(L: np.ndarray, D: np.ndarray, U: np.ndarray, last: int, r: np.ndarray)
     """
     nothing = (0.0, 0.0, 0.0, 0.0)
     W = (nothing, nothing, nothing, nothing)
-    for j in range(
-        last, 0, -1
-    ):  # from the drum to the tow point: this order needs no pivoting between blocks
+    # From the drum to the tow point: this order needs no pivoting between blocks.
+    for j in range(last, 0, -1):
         a, b = _row(D[j], L[j], r[j], 0), _row(D[j], L[j], r[j], 1)
         c, d = _row(D[j], L[j], r[j], 2), _row(D[j], L[j], r[j], 3)
         if j < last:  # a length knows the ends of its own segment only: row 0 of U is zero
             b, c, d = _less_next(b, U[j, 1], W), _less_next(c, U[j, 2], W), _less_next(d, U[j, 3], W)
         a, b, c, d = _eliminated(a, b, c, d)
-        if not (
-            abs(a[0]) > 0.0 and abs(b[1]) > 0.0 and abs(c[2]) > 0.0 and abs(d[3]) > 0.0
-        ):  # NaN fails, too
+        # Written so that NaN fails, too.
+        if not (abs(a[0]) > 0.0 and abs(b[1]) > 0.0 and abs(c[2]) > 0.0 and abs(d[3]) > 0.0):
             return j
         W = _substituted(a, b, c, d)
         _keep(W, L[j], r[j])

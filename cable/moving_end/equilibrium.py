@@ -80,6 +80,7 @@ def hang(line: Line, water: Water, c: CableNumbers, work: Load) -> float:
         the largest tension. [N]
     """
     N, F, whole, largest = line.ends.count, np.zeros(3), 0.0, 0.0
+    # A straight line between the ends is the first shape; its water gives the first drag.
     for j in range(N + 1):
         share = j / N
         for i in range(3):
@@ -87,6 +88,7 @@ def hang(line: Line, water: Water, c: CableNumbers, work: Load) -> float:
             line.position[NEW, j, i] = x[0, i] + share * (x[N, i] - x[0, i])
             line.velocity[NEW, j, i] = 0.0
     sample_water(line, water, line.ends.time)
+    # The direction of the cable is not known yet: the largest drag, square to the water, is the first load.
     for j in range(1, N + 1):
         _load_across(line, j, c, work)
         whole += _length(line, j)
@@ -101,6 +103,7 @@ def hang(line: Line, water: Water, c: CableNumbers, work: Load) -> float:
             )
             evaluate_load(line.tension[NEW, j], 0.0, 1.0, 0.0, c, work)
             for i in range(3):
+                # Half of the change, so that shape and drag settle instead of alternating.
                 line.load[j, i] += 0.5 * (_length(line, j) * work.q[i] - line.load[j, i])
     _keep(line, c, work)
     for j in range(1, N + 1):
@@ -130,11 +133,14 @@ def _close(line: Line, F: np.ndarray, e: float, whole: float) -> None:
         for i in range(3):
             square += line.load[j, i] ** 2
         size += sqrt(square)
+    # A cable without any load would have no scale for ε.
     size = max(size, 1e-9)
+    # ε → 0 is approached in stages: Newton's method converges from the minimum of the stage before.
     for level in range(ROUNDINGS):
         soft = size * 0.1 ** (1 + level)
         for _ in range(NEWTON_ROUNDS):
             value = _complementary(line, F, e, soft, load, gradient, hessian)
+            # The gradient of Φ is the gap by which the chain does not close. [m]
             if _norm(gradient) < 1e-9 * whole or not _solve_three(hessian, gradient, step):
                 break
             slope = step[0] * gradient[0] + step[1] * gradient[1] + step[2] * gradient[2]
@@ -142,6 +148,7 @@ def _close(line: Line, F: np.ndarray, e: float, whole: float) -> None:
             for _ in range(40):
                 for i in range(3):
                     trial[i] = F[i] - fraction * step[i]
+                # Φ is convex, so a step along Newton's direction always lowers it if it is short enough.
                 if _complementary(line, trial, e, soft, load, gradient, hessian) <= (
                     value - 1e-4 * fraction * slope
                 ):
@@ -209,6 +216,9 @@ def _solve_three(A: np.ndarray, b: np.ndarray, out: np.ndarray) -> bool:
     return True
 
 
+# A residual gap of the last iteration is spread evenly over the nodes.
+
+
 @inner
 def _lay(line: Line, F: np.ndarray, e: float) -> None:
     """Fill places and tensions of level NEW from the force at the first end; what does not close is shared out."""
@@ -236,6 +246,7 @@ def _keep(line: Line, c: CableNumbers, work: Load) -> None:
     """Make level NEW the present one, and the one before, at rest."""
     N = line.ends.count
     for j in range(N + 1):
+        # All levels are the same at rest, so that the next step sees no velocity and no acceleration.
         for i in range(3):
             for level in range(3):
                 line.position[level, j, i] = line.position[NEW, j, i]
@@ -265,11 +276,13 @@ def relax(line: Line, water: Water, c: CableNumbers, drum: DrumNumbers, work: Lo
         drum: a winch that holds the length.
         work: work space.
     """
+    # The first step, beyond `LONGEST`, leaves inertia out.
     step, last = 10.0 * LONGEST, np.inf
     whole = line.ends.settled + line.ends.last_length[NOW]
     for k in range(LOOKS):
         solved = _step_from_rest(line, step, water, c, drum, work)
         if not solved:
+            # With inertia and a shorter step, the solution is closer to the present shape.
             step = FIRST if step > LONGEST else 0.2 * step
             last = np.inf
             if step < SHORTEST:
@@ -277,9 +290,11 @@ def relax(line: Line, water: Water, c: CableNumbers, drum: DrumNumbers, work: Lo
             continue
         moved = _moved(line)
         _keep(line, c, work)
+        # Only a step without inertia proves rest: with it, a slow motion looks the same.
         if step > LONGEST and moved <= STILL * whole:
             fill_node_tensions(line)
             return k + 1
+        # The cable goes to and fro: a shorter step follows its motion.
         if moved > WAVERS * last and moved > 1e-6 * whole:
             step = 0.3 * min(step, LONGEST)
         elif moved < 0.5 * last or step > LONGEST:
@@ -295,6 +310,7 @@ def _step_from_rest(
     """Solve for level NEW a step from rest at level NOW; less exactly where rounding asks for it, and with a softened
     slack law where the sharp one fails.
     """
+    # Weights of first order without a past: nothing moved before, and a steady state needs no accuracy in time.
     a = 1.0 / step if step <= LONGEST else 0.0
     w = Weights(a, -a, 0.0, a, -a, 0.0, 0.0, a)
     for tolerance in (TOLERANCE, LOOSER):

@@ -51,18 +51,22 @@ def take_jolt(
     for i in range(3):
         out[i] = 0.0
     size = max(abs(change[0]), abs(change[1]), abs(change[2]))
+    # A cable that stretches takes a jolt up in waves; a free tail or a single segment is left to the time steps.
     if size < FELT or c.compliance > 0.0 or line.ends.count < 2 or line.ends.layout.free_end:
         return False
     tangents, masses = np.zeros((line.ends.count + 1, 3)), np.zeros((3, 3))
     _fill_tangents(line, tangents)
     _assemble(line, tangents, change, c, drum, masses)
     blocks, jump = line.blocks, line.rows[RESIDUAL]
+    # The blocks of the time step are used as work space, so their factors are lost.
     line.ends.solver.factored = False
     if solve(blocks[LOWER], blocks[DIAGONAL], blocks[UPPER], line.ends.count, jump) > 0:
         return False
+    # An impulse that pushes would make the cable slack: for longer than `SLACK_FOR`, it is left to the time steps.
     for j in range(1, line.ends.count + 1):
         if jump[j, 0] < -max(line.tension[NOW, j], 0.0) * SLACK_FOR:
             return False
+    # Half of the mass of the first segment is at the tow point, and moves at the mean of two nodes: a quarter each.
     _mass(line, tangents, 1, c, masses)
     for i in range(3):
         out[i] = jump[1, 0] * tangents[1, i]
@@ -123,6 +127,7 @@ def _assemble(
         _mass(line, tangents, j, c, M)
         t = tangents[j]
         for i in range(3):
+            # Row 0 of a block: the segment does not stretch, (ΔV_j − ΔV_{j−1})·t_j = 0.
             L[j, 0, 1 + i] = -t[i]
             if j < N:
                 D[j, 0, 1 + i] = t[i]
@@ -130,6 +135,7 @@ def _assemble(
             if j > 1:
                 U[j - 1, 1 + i, 0] -= t[i]
             for k in range(3):
+                # Half of a segment's mass at each node, times half of the velocity of each node.
                 quarter = 0.25 * M[i, k]
                 if j < N:
                     D[j, 1 + i, 1 + k] += quarter
@@ -139,6 +145,7 @@ def _assemble(
                     if j < N:
                         U[j - 1, 1 + i, 1 + k] += quarter
     _assemble_drum(line, tangents, M, drum)
+    # ΔV_0 is known: its column moves to the right-hand side.
     for m in range(4):
         for k in range(3):
             r[1, m] -= L[1, m, 1 + k] * change[k]
@@ -156,6 +163,7 @@ def _assemble_drum(line: Line, tangents: np.ndarray, M: np.ndarray, drum: DrumNu
             Mt += M[i, k] * t[k]
         mass += t[i] * Mt
         U[N - 1, 1 + i, 1] -= 0.25 * Mt
+    # The last block has two unknowns, τ_N and ΔU; the other two rows are 0 = 0.
     D[0, 1], D[2, 2], D[3, 3] = -1.0, 1.0, 1.0
     if drum.control == LENGTH or line.ends.drum_mode == STANDING:
         D[1, 1] = 1.0
@@ -187,6 +195,7 @@ def _apply(line: Line, tangents: np.ndarray, change: np.ndarray, c: CableNumbers
     if _is_ahead(line):
         line.ends.ahead[NOW] -= jump[N, 1]
     line.ends.ahead[BEFORE] = line.ends.ahead[NOW]
+    # Differences of second order across the jump would be wrong: the next step has no past.
     line.ends.previous_step = 0.0
     for j in range(1, N + 1):
         segment_momentum(line, NOW, j, _length(line, j), c, work)

@@ -110,15 +110,18 @@ def evaluate_load(T: float, slip: float, gain: float, a0: float, c: CableNumbers
     """
     t, across = work.tangent, work.across
     for i in range(3):
+        # 1/r is known: a multiplication instead of a division.
         t[i] = work.chord[i] * work.shorter
     evaluate_momentum(c, work)
     Ut = work.along
     normal = sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2])
+    # A stretched segment is longer and thinner: its surface is √(1+eT) times as large.
     stretch = sqrt(1.0 + c.compliance * T)
     kt, kn = stretch * c.tangential_drag, gain * stretch * c.normal_drag
     for i in range(3):
         work.drag[i] = kt * abs(Ut + slip) * (Ut + slip) * t[i] + kn * normal * across[i]
         work.q[i] = a0 * work.momentum[i] + work.drag[i]
+    # −w_c k: k points down, along the third axis.
     work.q[2] -= c.weight
     work.side, work.kt, work.kn = normal, kt, kn
 
@@ -136,6 +139,7 @@ def differentiate_load(slip: float, a0: float, c: CableNumbers, work: Load) -> N
     """
     t, across, Ut, normal = work.tangent, work.across, work.along, work.side
     g, pulled = turning_rate(work.square), work.kt * abs(Ut + slip)
+    # U_⊥ U_⊥ᵀ/|U_⊥| tends to 0 with U_⊥.
     turned = work.kn / normal if normal > 1e-12 else 0.0
     inert, side = a0 * c.added_mass, work.kn * normal
     At = turned * (across[0] * t[0] + across[1] * t[1] + across[2] * t[2])
@@ -168,6 +172,7 @@ def take_segment(x: np.ndarray, V: np.ndarray, J: np.ndarray, j: int, work: Load
     """Fill chord, velocity and water of segment j, given those of the nodes at one level (nodes, 3)."""
     for i in range(3):
         work.chord[i] = x[j, i] - x[j - 1, i]
+        # The middle of a segment moves at the mean velocity of its nodes.
         work.velocity[i] = 0.5 * (V[j - 1, i] + V[j, i])
         work.water[i] = 0.5 * (J[j - 1, i] + J[j, i])
 
@@ -175,6 +180,7 @@ def take_segment(x: np.ndarray, V: np.ndarray, J: np.ndarray, j: int, work: Load
 @inner
 def segment_momentum(line: Line, level: int, j: int, length: float, c: CableNumbers, work: Load) -> None:
     """Fill ∫p ds of segment j at a level; the tangent is the one of level NOW, where the segment has a length."""
+    # At an earlier level the growing segment may have had no length, and so no tangent.
     take_segment(line.position[NOW], line.velocity[level], line.water[level], j, work)
     whole = line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
     r = chord_length(squared_share(work.chord, whole), whole)

@@ -131,6 +131,7 @@ def follow_path(
     Returns:
         the number of filled rows: all, unless it failed; `line.ends.solved` holds how the last step was solved.
     """
+    # A row takes one node more than it has segments, and rows are packed without gaps.
     rows, used = path.times.size, line.ends.count + 1
     suggested = FIRST_STEP * (path.times[1] - path.times[0])
     note_force(line)
@@ -138,6 +139,7 @@ def follow_path(
     write_row(line, record, 0, 0, c)
     for k in range(1, rows):
         suggested = _cover(line, path, k, led, water, c, drum, rtol, suggested, work, record)
+        # Out of memory for a row is treated like a step that failed: the caller keeps the rows that are filled.
         if not line.ends.solved.converged or used + line.ends.count + 1 > record.tension.size:
             return k
         write_row(line, record, k, used, c)
@@ -164,11 +166,13 @@ def _cover(
     whole = path.times[k] - path.times[k - 1]
     finest, done, spent, point = whole * 0.5**MOST_CUTS, 0.0, 0, np.zeros(3)
     jump = path.leaving[k - 1] - path.arriving[k - 1]
+    # In row 1 the jump from rest is part of the initial state, which `lay_straight` has filled.
     if k > 1 and take_jolt(line, jump, c, drum, work, record.impulse[k - 1]):
         energy_flow(line, c, work, record.ledger[1])
         suggested = min(suggested, FIRST_STEP * whole)
     step = min(suggested, whole) if rtol > 0.0 else whole
     while True:
+        # The rest of the row is divided evenly, so that the last step is not tiny.
         step = (whole - done) / np.ceil((whole - done) / step - 1e-9)
         x, near, far = (done + step) / whole, path.place[k - 1], path.place[k]
         hermite(near, far, path.leaving[k - 1], path.arriving[k], whole, x, point)
@@ -177,6 +181,7 @@ def _cover(
         converged = try_step(line, step, point, water, c, drum, work)
         spent += line.ends.solved.iterations
         error = estimate_error(line, step) if rtol > 0.0 and converged else 0.0
+        # The smallest step is accepted with any error: a jolt has no accurate one.
         if converged and (error <= rtol or step <= finest * (1.0 + 1e-6)):
             accept(line, step, c, work)
             note_force(line)
@@ -189,6 +194,7 @@ def _cover(
                 return suggested
             step = suggested
         else:
+            # A rejected step may have changed the state of the drum.
             line.ends.drum_mode = mode
             step = max(next_step(step, error, rtol), finest) if converged else 0.5 * step
             if step < whole * 0.5**MOST_HALVINGS:
@@ -226,6 +232,7 @@ def pull_out(task: PullOut, scheme: MovingEnd) -> History:
     line.ends.layout.segment_length, line.ends.layout.grading = segment_length, scheme.grading
     line.ends.solver.tolerance, line.ends.layout.run_in = scheme.tolerance, scheme.run_in
     c, drum = task.cable.numbers(), task.drum.numbers()
+    # The velocity of the drum at the start is needed before the first step sets it.
     drum.velocity[:] = led[0, VELOCITY:SETPOINT]
     if isinstance(start, Equilibrium):
         rate = (led[1, SETPOINT] - led[0, SETPOINT]) / path.times[1] if drum.control == LENGTH else 0.0
@@ -250,6 +257,7 @@ def tow(task: Tow, scheme: MovingEnd) -> History:
     line.ends.solver.tolerance = scheme.tolerance
     set_steady_tow(line, path.leaving[0], J, task.cable, tail_drag)
     path.place[:] += line.position[NOW, 0]
+    # Places are counted from the tail: with this origin the tow point starts at (0, 0, 0), where J was taken.
     origin = -line.position[NOW, 0]
     return _run(line, path, resting(path.times), task.current.numbers(origin), c, idle, scheme.rtol)
 
@@ -278,6 +286,7 @@ def _capacity(task: PullOut, path: TowPath, led: np.ndarray, segment_length: flo
     else:
         ways = length_of_way(path.place) + length_of_way(led[:, PLACE:VELOCITY])
         reach = 1.5 * (ways + task.current.fastest * task.duration) + task.wet_length
+        # Space for twice the reach, and 5 m: the arrays of a compiled run cannot grow.
         longest = 2.0 * reach + 5.0
     capacity = segments_needed(longest, segment_length, scheme.grading) + int(scheme.run_in / segment_length)
     if isinstance(task.start, Equilibrium):
@@ -309,6 +318,7 @@ def as_history(path: TowPath, record: Record, rows: int, solved: Solved, trouble
     """Return the record's filled rows as a history; `trouble` says what stopped it, if it was stopped."""
     times, tow, completed = path.times, path.place, rows == path.times.size
     message = "The run reached its end." if completed else trouble
+    # Shapes are packed in one array; the cuts are the first nodes of the rows.
     cuts = np.cumsum(record.segments[:rows] + 1).tolist()
     parts = [slice(first, last) for first, last in zip([0, *cuts], cuts, strict=False)]
     return History(
@@ -344,6 +354,7 @@ def estimate_error(line: Line, step: float) -> float:
     if line.ends.previous_step <= 0.0:
         return 0.0
     ratio, F, past = step / line.ends.previous_step, line.ends.tow.force, line.ends.tow.past
+    # F is compared with its linear extrapolation from two steps (see the module).
     gap, size = 0.0, line.ends.tow.largest * line.ends.tow.largest
     for i in range(3):
         gap += (F[i] - past[0, i] - ratio * (past[0, i] - past[1, i])) ** 2
@@ -366,4 +377,5 @@ def next_step(step: float, error: float, rtol: float) -> float:
     """Return the step that would err by a little less than `rtol`, given that `step` errs by `error`. [s]."""
     if error <= 0.0 or rtol <= 0.0:
         return LARGEST_GROWTH * step
+    # Limits on the change keep one odd estimate from changing the step by orders of magnitude.
     return step * min(max(SAFETY * sqrt(rtol / error), LARGEST_CUT), LARGEST_GROWTH)

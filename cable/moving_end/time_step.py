@@ -85,8 +85,10 @@ def try_step(
         again: level NEW holds the answer to another tow point, close by.
     """
     failed, converged = 0, False
+    # The solution may show that the drum is in another state than assumed: solve again in that state.
     for change in range(MOST_DRUM_CHANGES):
         converged = _solve_softly(line, step, tow, water, c, drum, work, again and change == 0)
+        # With one segment, a winch or a free end the drum has one state only.
         if line.ends.count == 1 or drum.control != FREE or line.ends.layout.free_end:
             break
         ends = line.ends
@@ -94,6 +96,7 @@ def try_step(
             ends.drum_mode, converged, rate_taken(line, 1.0 / step), ends.loose[NEW], ends.drum_pull, drum
         )
         if not converged or (mode == STANDING and ends.drum_mode == SPINNING):
+            # A bit for each state without a solution, so that the loop does not return to it.
             failed |= 1 << line.ends.drum_mode  # a line that would take loose cable back stands
         if mode == line.ends.drum_mode or (failed >> mode) & 1:
             break
@@ -137,9 +140,11 @@ def _solve_softly(
     _predict(line, step, tow, water, c, drum, work)
     if solve_step(line, w, c, drum, work, False):
         return True
+    # Last attempt: a softer slack law lets Newton's method converge from farther away.
     _predict(line, step, tow, water, c, drum, work)
     pull = drum.friction + abs(c.weight) * (line.ends.settled + line.ends.last_length[NOW])
     for j in range(1, line.ends.count + 1):
+        # All segments start taut, with at least the tension that friction and weight can cause.
         line.tension[NEW, j] = max(line.tension[NEW, j], pull)
     spent = line.ends.solved.iterations
     line.ends.solver.smoothing = SOFTEST
@@ -148,6 +153,7 @@ def _solve_softly(
         spent += line.ends.solved.iterations
         if not converged or line.ends.solver.smoothing <= SMOOTHING:
             break
+        # The solution for one smoothing is the first guess for the next, ten times as sharp.
         line.ends.solver.smoothing = max(0.1 * line.ends.solver.smoothing, SMOOTHING)
     line.ends.solver.smoothing = SMOOTHING
     line.ends.solved.iterations = spent
@@ -163,6 +169,7 @@ def _predict(
     ratio = step / line.ends.previous_step if line.ends.previous_step > 0.0 else 0.0
     for j in range(N + 1):
         tension = line.tension[NOW, j] + ratio * (line.tension[NOW, j] - line.tension[BEFORE, j])
+        # An extrapolation that is slack is replaced by the present tension, or by `TAUT` if that is larger.
         line.tension[NEW, j] = tension if tension > KNOWN else max(line.tension[NOW, j], TAUT)
         for i in range(3):
             change = ratio * (line.velocity[NOW, j, i] - line.velocity[BEFORE, j, i])
@@ -175,6 +182,7 @@ def _predict(
         line.ends.drum_velocity[i] = drum.velocity[i]
     rate, last = line.ends.payout, line.ends.last_length
     growth = step * (rate[NOW] + 0.5 * ratio * (rate[NOW] - rate[BEFORE]))
+    # The last segment is predicted to shrink to half of its length at most: a length has to remain positive.
     last[NEW] = max(last[NOW] + (0.0 if line.ends.drum_mode == STANDING else growth), 0.5 * last[NOW])
     if not line.ends.layout.free_end:
         pull = max(line.node_tension[N], 0.0)
@@ -207,6 +215,7 @@ def solve_step(
     _residual(line, w, c, drum, work, near)
     merit = _merit(line)
     for iteration in range(MAX_ITERATIONS):
+        # `merit` decides on the length of a Newton step, `size`, in tolerances, on convergence.
         size = _size(line, rounding, merit)
         if size <= 1.0:
             return _solved(line, iteration, size)
@@ -216,11 +225,14 @@ def solve_step(
         if not line.ends.solver.factored:
             break
         last_length, before, fraction = save_guess(line), merit, 1.0
+        # Far from the solution another iteration is certain, so its matrix is computed together with the residual.
         made = before > FAR or not alone
         for _ in range(MAX_HALVINGS):
             go_from_guess(line, last_length, fraction)
             _residual(line, w, c, drum, work, not made)
             merit = _merit(line)
+            # A residual has to fall by enough, and NaN never does; below `NEARLY` rounding decides, so any is
+            # accepted.
             if isfinite(merit) and merit <= max(before * (1.0 - 0.1 * fraction), NEARLY):
                 break
             fraction *= 0.5
@@ -263,6 +275,7 @@ def go_from_guess(line: Line, last_length: float, fraction: float) -> None:
                 line.position[NEW, j, i] = guess[j, 1 + i] - fraction * step[j, 1 + i]
     if line.ends.layout.free_end:
         return
+    # A Newton step may not make the last segment negative: it shrinks to a tenth at most.
     line.ends.last_length[NEW] = max(last_length - fraction * step[N, 1], 0.1 * last_length, SMALLEST_SEGMENT)
 
 
@@ -277,6 +290,7 @@ def _tolerances(line: Line, rounding: float) -> tuple[float, float]:
     for j in range(1, line.ends.count + 1):
         tension = max(tension, abs(line.tension[NEW, j]))
         reach = max(reach, abs(x[NEW, j, 0]), abs(x[NEW, j, 1]), abs(x[NEW, j, 2]))
+    # Lengths are differences of coordinates, so the rounding of large coordinates limits their accuracy.
     known = 2.0 * ROUNDING / STRAIN_SCALE * reach / max(line.length[1], SMALLEST_SEGMENT)
     strain = line.ends.solver.tolerance + known
     return strain, line.ends.solver.tolerance * tension + ABSOLUTE_TOLERANCE + rounding * line.length[
@@ -311,6 +325,7 @@ def _failed(line: Line, rounding: float) -> bool:
     for j in range(1, line.ends.count + 1):
         for i in range(4):
             size = abs(line.rows[RESIDUAL, j, i]) / (strain if i == 0 else allowed)
+            # Once the worst value is NaN, worst == worst is false, so the first NaN is reported.
             if worst == worst and not size <= worst:
                 worst, node, equation = size, j, i
     solved = line.ends.solved
@@ -346,6 +361,7 @@ def impedance(line: Line, Z: np.ndarray) -> None:
     for i in range(3):
         for k in range(3):
             Z[i, k] = line.ends.tow.by_tow[i, k]
+            # The direct derivative plus the response of the first block: the chain rule over the whole cable.
             for m in range(4):
                 Z[i, k] -= line.ends.tow.by_block[i, m] * line.ends.tow.answer[k, m]
 
@@ -358,6 +374,7 @@ def _relax(line: Line, gap: np.ndarray) -> None:
         for m in range(SIZE):
             step[j, m] = 0.0
     for m in range(SIZE):
+        # The displacement enters the first block only; `spread` carries it to the others.
         for i in range(3):
             step[1, m] += L[1, m, 1 + i] * gap[i]
     spread(L, line.ends.count, step)

@@ -14,8 +14,8 @@ tow point, with the speed V there split along and across the cable, V_t = V cos 
 
 (Next to V_t κ, ∂V_n/∂s is taken for a straight line to the drum: good enough where it is small.) Between the tow
 point and the drum V_t falls from V cos α to the drum's S'; where on the way it does, is taken from where κ V_n was
-lost when the tow point came by. Then the integral needs no memory of the way but the sums P = ∫dp, A = ∫κ|V_n| dp, ∫A
-dp and ∫A² dp along it:
+lost when the tow point came by. Then the integral needs no memory of the way but the sums P = ∫dp, A = ∫κ|V_n| dp,
+∫A dp and ∫A² dp along it:
 
     V_t(p) = S' + (V cos α − S') A(p)/A
 """

@@ -476,9 +476,7 @@ def _overlay(axes: Axes, drawn: Drawn, channel: str) -> None:
 
 
 def _recorded_wrong(curves: Curves, channel: str) -> np.ndarray:
-    """Return time and value of the samples that are affected by an error in the data, as they were recorded (n,
-    2).
-    """
+    """Return time and value (n, 2) of the samples that are affected by an error in the data, as they were recorded."""
     time, values = curves.recorded.get(channel, (np.empty(0), np.empty(0)))
     right = set(zip(np.round(curves.time, 6), curves.measured[channel], strict=True))
     pairs = zip(np.round(time, 6), values, strict=True)
