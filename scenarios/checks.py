@@ -46,7 +46,7 @@ class Checks:
         if number is None:
             self.say(name, NO_NUMBER, quantity.allowed, given)
         elif not _inside(number, quantity):
-            self._outside(name, number, quantity)
+            self._note_out_of_limits(name, number, quantity)
         else:
             self._keep(name, number)
 
@@ -63,7 +63,7 @@ class Checks:
         numbers = tuple(array.tolist())
         for i, (number, quantity) in enumerate(zip(numbers, quantities, strict=True)):
             if not _inside(number, quantity):
-                self._outside(f"{name}[{i}]", number, quantity)
+                self._note_out_of_limits(f"{name}[{i}]", number, quantity)
         self._keep(name, numbers)
 
     def rows(
@@ -128,7 +128,7 @@ class Checks:
         array.setflags(write=False)
         self._keep(name, array)
 
-    def _outside(self, name: str, number: float, quantity: Quantity) -> None:
+    def _note_out_of_limits(self, name: str, number: float, quantity: Quantity) -> None:
         """Note a number outside its limits, in inner units and in those of the files."""
         unit = {"degree": " rad", "degree/s": " rad/s", "1": ""}.get(quantity.unit, f" {quantity.unit}")
         file = f" ({number / quantity.scale:g} {quantity.unit})" if quantity.scale != 1.0 else ""
@@ -140,7 +140,7 @@ class Checks:
         """Note the first number of a column that is outside its limits."""
         wrong = np.flatnonzero(~_inside(values, quantity))
         if wrong.size:
-            self._outside(f"{name}[{wrong[0]}]", float(values[wrong[0]]), quantity)
+            self._note_out_of_limits(f"{name}[{wrong[0]}]", float(values[wrong[0]]), quantity)
 
     def _array(self, name: str, shape: tuple[int | None, ...]) -> np.ndarray | None:
         """Return a field as an array of finite numbers of a shape (None: any count above zero); note the problems

@@ -35,6 +35,7 @@ def _add_bending(line: Line, c: StiffCableNumbers) -> None:
 @allocating
 def _bend(line: Line, stiffness: float) -> None:
     """Do that for all segments."""
+    # `assemble` fills the three inner diagonals; the outer two are filled here only.
     for j in range(1, line.ends.count + 1):
         for i in range(4):
             for k in range(4):

@@ -52,11 +52,13 @@ def correct_for_arc(line: Line, led: bool, work: Load) -> None:
     """Fill line.slip and line.normal_gain from the prediction on level NEW and the velocities of level NOW; `led` by a
     winch, a cable need not slide.
     """
+    # Three tangents in rotation: a segment needs those of its two neighbours only.
     N, tangents = line.ends.count, scratch(3, 3)
     _tangent(line, 1, tangents[1])
     _tangent(line, 1, tangents[0])
     for j in range(1, N + 1):
         before, t, after = tangents[(j - 1) % 3], tangents[j % 3], tangents[(j + 1) % 3]
+        # The last segment has no next one: its own tangent takes that place.
         _tangent(line, min(j + 1, N), after)
         square = _turning_angle(line, j, before, after, work.across)
         theta, U = work.across, work.velocity
@@ -70,6 +72,7 @@ def correct_for_arc(line: Line, led: bool, work: Load) -> None:
             speed += U[i] * U[i]
         line.slip[j] = 0.25 * slide
         in_plane = min(side * side / max(square * (speed - along * along), STILL), 1.0)
+        # Without curvature or speed along the cable λ would be 0/0; a cable that is not led by a winch has λ = 1.
         reported = led and square * abs(along) > STILL
         sliding = min(max(slide / (square * along), 0.0), 1.0) if reported else 1.0
         oblique = along * along * square / max(side * side, STILL * STILL)
@@ -98,6 +101,7 @@ def _turning_angle(line: Line, j: int, before: np.ndarray, after: np.ndarray, th
     for i in range(3):
         theta[i] = share * (after[i] - before[i])
         square += theta[i] * theta[i]
+    # The vector is shortened together with its square, so that both corrections are limited.
     if square > MOST_BENT * MOST_BENT:
         for i in range(3):
             theta[i] *= MOST_BENT / sqrt(square)

@@ -32,6 +32,7 @@ def drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load, slopes: bool
     N, t, r = line.ends.count, work.tangent, line.rows[RESIDUAL, line.ends.count]
     Qt = line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2]
     line.ends.drum_pull = line.tension[NEW, N] + 0.5 * Qt
+    # T t + ½Q: the last node carries half of the load of the last segment.
     for i in range(3):
         line.ends.drum_force[i] = line.tension[NEW, N] * t[i] + 0.5 * line.load[N, i]
     turn_drum(line, w, drum)

@@ -30,6 +30,7 @@ def lay_straight(
     ends, away = line.ends, 0.0
     ends.count, ends.settled, ends.time, ends.previous_step = 1, 0.0, 0.0, 0.0
     ends.drum_mode, ends.drum_pull = TURNING, 0.0
+    # The last segment, which grows at the drum, takes the remainder.
     while wet_length - ends.settled > SPLIT_AT * spacing(line):
         line.length[ends.count] = spacing(line) + _more_in_the_middle(line, wet_length)
         ends.settled += line.length[ends.count]
@@ -70,6 +71,7 @@ def _pull_straight(
         if j > 0:
             for level in range(2):
                 line.tension[level, j] = per_metre * (along - 0.5 * line.length[j])
+            # `along` is the distance from the drum: it falls from the wet length to zero at the last node.
             along = along - line.length[j] if j < line.ends.count else 0.0
         line.node_tension[j] = max(per_metre, 0.0) * along
         for i in range(3):
@@ -123,6 +125,7 @@ def steady_direction(
 ) -> np.ndarray:
     """Return the direction from the tail to the tow point in a steady tow, a unit vector (3,)."""
     speed, weight = float(np.linalg.norm(velocity[0] - J)), cable.weight_in_water
+    # A cable at rest in the water hangs straight down, or up if it is buoyant.
     if speed == 0.0 and weight != 0.0:
         return np.array([0.0, 0.0, -np.sign(weight)])
     ahead = first_direction(velocity - J)
@@ -143,6 +146,7 @@ def set_steady_tow(
     line.ends.payout[:] = 0.0
     pulls, middles = [tail_drag * float(U @ U)], []
     lengths = [*line.length[1:N].tolist(), line.ends.last_length[NOW]]
+    # From the tail to the tow point, as the tension of each segment depends on the one before.
     for length in reversed(lengths):
         middles.append(_grown(pulls[-1], 0.5 * length, drag, weight, cable.compliance))
         pulls.append(_grown(middles[-1], 0.5 * length, drag, weight, cable.compliance))

@@ -5,7 +5,7 @@ A thin cable cannot be compressed: it buckles, and its chord gets shorter. With 
 
     T ≥ 0,   σ ≥ 0,   T σ = 0
 
-which is smoothed to T σ = T₀ (`SMOOTHING`, 1e-13 N) and written as one equation that Newton's method likes,
+which is smoothed to T σ = T₀ (`SMOOTHING`, 1e-13 N) and written as one equation that suits Newton's method,
 the Fischer-Burmeister function φ(a, b) = a + b − √(a² + b² + 2μ) = 0 with a = T/T_r and b = σ/σ_r.
 
 Departs from source: the paper takes the cable as taut everywhere (its equations are singular at T = 0). The cost of

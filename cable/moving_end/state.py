@@ -19,6 +19,7 @@ from cable.moving_end.slack_law import SMOOTHING
 from cable.schemes import TOLERANCE
 from subzero.jit import Record, inlined, inner, made_once
 
+# Levels of time: indices of the first axis of the arrays of `Line`.
 NEW, NOW, BEFORE = 0, 1, 2
 
 KNOWN_STEPS = 3
@@ -194,6 +195,7 @@ LOWER, DIAGONAL, UPPER, LOWER2, UPPER2 = range(5)
 
 def new_line(capacity: int) -> Line:
     """Return an empty line with space for `capacity` segments."""
+    # A line of n segments has n + 1 nodes.
     return Line(ends=_new_ends(), **_per_node(capacity + 1))
 
 
@@ -215,12 +217,14 @@ def _new_ends() -> Ends:
         payout=np.zeros(3),
         loose=np.zeros(3),
         ahead=np.zeros(3),
+        # No cable was loose yet, so rates are of second order from the start.
         since_loose=KNOWN_STEPS,
         drum_mode=TURNING,
         drum_pull=0.0,
         drum_force=np.zeros(3),
         drum_velocity=np.zeros(3),
         time=0.0,
+        # 0: there is no earlier level.
         previous_step=0.0,
         layout=Layout(),
         tow=tow,
@@ -238,8 +242,10 @@ def _per_node(n: int) -> dict[str, Any]:
         "node_tension": np.zeros(n),
         "forcing": np.zeros((n, 3)),
         "slip": np.zeros(n),
+        # A gain of 1 is no correction.
         "normal_gain": np.ones(n),
         "load": np.zeros((n, 3)),
+        # The outer two of the five diagonals are used by a cable with bending stiffness only.
         "blocks": np.zeros((5, n, 4, 4)),
         "pivots": np.zeros((n, 4), np.int64),
         "rows": np.zeros((3, n, 4)),
@@ -249,6 +255,7 @@ def _per_node(n: int) -> dict[str, Any]:
 def enlarged(line: Line, capacity: int) -> Line:
     """Return the same line with space for `capacity` segments."""
     larger = _per_node(capacity + 1)
+    # Nodes keep their numbers: old arrays fill the beginning of the new ones.
     for name, new in larger.items():
         old = getattr(line, name)
         new[tuple(slice(0, size) for size in old.shape)] = old
@@ -283,6 +290,7 @@ def spacing(line: Line) -> float:
     layout, settled = line.ends.layout, line.ends.settled
     share = 1.0
     if layout.run_in > 0.0:
+        # Shorter near the tow point, where a cable of no length begins.
         share = min(1.0, np.sqrt(settled / layout.run_in) + 0.25 * layout.segment_length / layout.run_in)
     return share * layout.segment_length + layout.grading * settled
 
@@ -291,10 +299,12 @@ def spacing(line: Line) -> float:
 def sample_water(line: Line, water: Water, time: float) -> None:
     """Fill the water's velocity at the nodes of level NEW."""
     x, J, uniform = line.position[NEW], line.water[NEW], water.velocity
+    # A uniform current does not depend on places.
     if uniform.shape[0] == 1:
         for j in range(line.ends.count + 1):
             for i in range(3):
                 J[j, i] = uniform[0, i]
         return
+    # Places on level NEW: the water is sampled for the predicted shape.
     for j in range(line.ends.count + 1):
         J[j, 0], J[j, 1], J[j, 2] = water_velocity(water, x[j, 0], x[j, 1], x[j, 2], time)

@@ -45,6 +45,7 @@ def describe_stop(
         c: the cable's numbers.
         names: of the settings.
     """
+    # The most specific cause comes first; the last message is for all others.
     words, solved = names or Names(), line.ends.solved
     way = float(np.linalg.norm(line.position[NEW, 0] - drum.place))
     if drum.control == LENGTH and way >= NEARLY_TAUT * drum.setpoint:
@@ -52,11 +53,13 @@ def describe_stop(
             f"The cable is too short beyond t = {time:g} s: the winch has paid out {drum.setpoint:.5g} m, the vehicle "
             f"is {way:.5g} m away. Try {words.yielding}, or a higher {words.rate}."
         )
+    # The step was solved, but there is no space for more cable.
     if solved.converged:
         return (
             f"The drum has given far more cable until t = {time:g} s than the ways of its ends ask for: nothing holds "
             "it back. Try more friction_torque, or a winch."
         )
+    # The residual is within its tolerance: the step was refused because it takes up cable (`time_step`).
     if solved.residual <= 1.0 and drum.control == FREE:
         return (
             f"The cable would push itself back onto the drum beyond t = {time:g} s, and a free drum takes none up. "

@@ -191,14 +191,14 @@ def linearise_along(
             name: getattr(trial, name) for name in ("cable_step", "hull_step", "segment_length", "grading")
         }
         trial = blank_trial(model, x, start.wet_length, steps)
-    room = trial.start.wet_length + ROOM
+    capacity = trial.start.wet_length + ROOM
     while True:
-        step = Tethered(trial, model, room, x=x, exact=True)
+        step = Tethered(trial, model, capacity, x=x, exact=True)
         try:
             states = _run(step, time, commands, parts)
             return Along(time=time, commands=commands, parts=parts, states=states, step=step)
         except NoRoomError:
-            room *= 2.0
+            capacity *= 2.0
 
 
 def _commands(trial: Trial, time: np.ndarray) -> np.ndarray:

@@ -108,8 +108,8 @@ class Tethered:
         self._setup = self._setup._replace(orders=Orders(np.zeros(1), np.zeros((1, 4))))
         if exact:
             live.line.ends.solver.tolerance, self._setup.fixed.agreement = EXACT, EXACT
-        room = int((longest + RUN_IN) / trial.segment_length) + SPARE + 4
-        self._live = live._replace(line=enlarged(live.line, max(room, live.line.length.size)))
+        capacity = int((longest + RUN_IN) / trial.segment_length) + SPARE + 4
+        self._live = live._replace(line=enlarged(live.line, max(capacity, live.line.length.size)))
         self._memory = Memory(self._live)
         self._recording = new_recording(2, 4 * self._live.line.length.size)
         self._r_c = model.vehicle.tow_point.position()

@@ -63,7 +63,7 @@ class ProgressBar:
     def __init__(self, words: str, console: Console, costs: Callable[[], str] = str) -> None:
         self._words, self._console, self._costs = words, console, costs
         self._bar: Progress | None = None
-        self._fraction, self._begun, self._moved = 0.0, monotonic(), monotonic()
+        self._fraction, self._started, self._moved = 0.0, monotonic(), monotonic()
         self._reported: set[str] = set()
         self._counting, self._made, self._opening = False, -1, threading.Lock()
         self._ended = threading.Event()
@@ -73,7 +73,7 @@ class ProgressBar:
         if fraction != self._fraction or (words and words != self._words):
             self._moved = monotonic()
         self._words, self._fraction = words or self._words, fraction
-        if monotonic() - self._begun > PATIENCE_S:
+        if monotonic() - self._started > PATIENCE_S:
             self._open()
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=fraction, description=self._words)
@@ -82,11 +82,11 @@ class ProgressBar:
         """Report if the work stands still, or if its rate so far means hours; each once."""
         now = monotonic()
         if _compiling():
-            self._begun, self._moved = self._begun + CHECK_S, now
+            self._started, self._moved = self._started + CHECK_S, now
             self._count()
             return
         self._end_count()
-        ran = now - self._begun
+        ran = now - self._started
         left = ran * (1.0 / self._fraction - 1.0) if self._fraction > 0.0 else 0.0
         if now - self._moved >= STANDSTILL_S:
             self._notify("still", f"has not moved on for {now - self._moved:.0f} s")

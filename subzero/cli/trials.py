@@ -140,7 +140,10 @@ def _toml(path: Path) -> tuple[str, str]:
     found = contents(path)
     if kind == "vehicle":
         _check_vehicle(found)
-    return kind, f"{len(found.numbers)} numbers, {_outside(found)} outside their own plausible range"
+    return (
+        kind,
+        f"{len(found.numbers)} numbers, {_count_implausible(found)} outside their own plausible range",
+    )
 
 
 def _check_vehicle(found: Contents) -> None:
@@ -152,7 +155,7 @@ def _check_vehicle(found: Contents) -> None:
     from_mapping(numbers)
 
 
-def _outside(found: Contents) -> int:
+def _count_implausible(found: Contents) -> int:
     return sum(
         not number.low <= number.values[0] <= number.high
         for number in found.numbers

@@ -253,12 +253,12 @@ def cut(recording: Recording, rows: int, used: int) -> Recording:
 def thinned(run: Run, stride: int) -> Run:
     """Return every so many rows of a run, and its last one."""
     rows = np.arange(run.times.size)
-    stays = (rows % stride == 0) | (rows == rows[-1])
-    nodes = np.repeat(stays, run.recording.nodes)
+    keep = (rows % stride == 0) | (rows == rows[-1])
+    nodes = np.repeat(keep, run.recording.nodes)
     kept = {name: getattr(run.recording, name)[nodes] for name in BY_NODE}
     kept |= {name: getattr(run.recording, name) for name in BY_TIME}
-    by_row = {name: values[stays] for name, values in run.recording._asdict().items() if name not in kept}
-    return replace(run, times=run.times[stays], recording=Recording(**by_row | kept))
+    by_row = {name: values[keep] for name, values in run.recording._asdict().items() if name not in kept}
+    return replace(run, times=run.times[keep], recording=Recording(**by_row | kept))
 
 
 def run_so_far(

@@ -455,7 +455,7 @@ class Newest(Generic[Request, Found]):
     ) -> None:
         self._work, self._done, self._failed = work, done, failed
         self._waiting: list[Request] = []
-        self._begun = self._ended = False
+        self._started = self._ended = False
         self._news = threading.Condition()
 
     def ask(self, request: Request) -> None:
@@ -463,8 +463,8 @@ class Newest(Generic[Request, Found]):
         with self._news:
             self._waiting = [request]
             self._news.notify()
-            if not self._begun:  # a page that is only looked at needs no thread
-                self._begun = True
+            if not self._started:  # a page that is only looked at needs no thread
+                self._started = True
                 threading.Thread(target=self._go_on, daemon=True).start()
 
     def end(self) -> None:

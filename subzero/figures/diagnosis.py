@@ -418,7 +418,7 @@ def rivals(drawn: Drawn, title: Title) -> Figure | None:
     worst = sorted(curves.measured, key=lambda channel: -_apart(drawn, channel, names))[:6]
     figure, panels = sheet((len(worst) + 1) // 2, 2, title)
     for axes, channel in zip(panels, worst, strict=False):
-        _beside(axes, drawn, channel, names)
+        _draw_less_best(axes, drawn, channel, names)
         model = "extended model" if best == "extended" else "most probable"
         headline(axes, f"{BY_NAME[channel].name.replace('_', ' ').capitalize()} − {model}")
     legend(panels[0], columns=1)
@@ -436,8 +436,8 @@ def _apart(drawn: Drawn, channel: str, names: list[str]) -> float:
     return float(max(gaps)) / (noise.noise_sd if noise else 1.0)
 
 
-def _beside(axes: Axes, drawn: Drawn, channel: str, names: list[str]) -> None:
-    """Draw rivals and what was measured, smoothed, less the best model."""
+def _draw_less_best(axes: Axes, drawn: Drawn, channel: str, names: list[str]) -> None:
+    """Draw rival models and the smoothed measurements, each minus the best model."""
     curves, best = drawn.curves, drawn.best
     time = curves.time[drawn.used(channel)]
     _band(axes, drawn.noise.get(channel))
@@ -476,7 +476,7 @@ def _overlay(axes: Axes, drawn: Drawn, channel: str) -> None:
 
 
 def _recorded_wrong(curves: Curves, channel: str) -> np.ndarray:
-    """Return time and value (n, 2) of the samples that are affected by an error in the data, as they were recorded."""
+    """Return recorded time and value of the samples that an error in the data affects (n, 2)."""
     time, values = curves.recorded.get(channel, (np.empty(0), np.empty(0)))
     right = set(zip(np.round(curves.time, 6), curves.measured[channel], strict=True))
     pairs = zip(np.round(time, 6), values, strict=True)

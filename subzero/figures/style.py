@@ -150,8 +150,8 @@ def page_width(inches: float) -> Iterator[None]:
 
 def _lines_of(title: Title) -> list[str]:
     """Return the lines of a title; the scenario's name and the first one share a line."""
-    room = TITLE_LENGTH * (width() - LEFT) - len(title.scenario)
-    return textwrap.wrap(title.words, max(int(room), 12))[: MOST_TITLE_LINES + (width() < ONE_COLUMN)]
+    most_letters = TITLE_LENGTH * (width() - LEFT) - len(title.scenario)
+    return textwrap.wrap(title.words, max(int(most_letters), 12))[: MOST_TITLE_LINES + (width() < ONE_COLUMN)]
 
 
 def sheet(rows: int, columns: int, title: Title) -> tuple[Figure, list[Axes]]:
@@ -211,8 +211,10 @@ def log_scale(axes: Axes) -> None:
 def headline(axes: Axes, text: str) -> None:
     """Say in words what a panel shows, behind its letter."""
     letter = axes.get_title(loc="left")
-    room = LETTERS_PER_INCH * _inches(axes)[0]
-    lines = textwrap.wrap(f"{letter} {text}".strip(), max(int(room), 12)) if width() < ONE_COLUMN else []
+    most_letters = LETTERS_PER_INCH * _inches(axes)[0]
+    lines = (
+        textwrap.wrap(f"{letter} {text}".strip(), max(int(most_letters), 12)) if width() < ONE_COLUMN else []
+    )
     axes.set_title("\n".join(lines) or f"{letter} {text}".strip(), loc="left", fontsize=NORMAL, pad=3)
 
 
@@ -266,14 +268,14 @@ COLUMN_GAP, HANDLE_GAP = 0.9, 0.5
 
 def _columns(labels: list[str], most: int, across: float, size: float, handle: float) -> int:
     """Return into how many columns of a legend some labels fit; they fill one column after the other."""
-    beside = (handle + COLUMN_GAP + HANDLE_GAP) * size / 72.0
+    extra = (handle + COLUMN_GAP + HANDLE_GAP) * size / 72.0
     for columns in range(min(most, max(len(labels), 1)), 1, -1):
         rows = math.ceil(len(labels) / columns)
         parts = [labels[at : at + rows] for at in range(0, len(labels), rows)]
-        at_most = sum(max(map(len, part)) * WIDEST_LETTER * size / 72.0 + beside for part in parts)
+        at_most = sum(max(map(len, part)) * WIDEST_LETTER * size / 72.0 + extra for part in parts)
         if at_most <= across:
             return columns
-        if sum(max(_wide(each, size) for each in part) + beside for part in parts) <= across:
+        if sum(max(_wide(each, size) for each in part) + extra for part in parts) <= across:
             return columns
     return 1
 

@@ -223,7 +223,7 @@ def trial_with_commands(trial: scenarios.Trial, record: Record, use: str | None)
     """
     names = [name for name in REPORTED_COMMANDS if name in record.values]
     if use == FROM_RECORD:
-        return _told_by(record, names, trial)
+        return _with_recorded_commands(record, names, trial)
     if trial.commands is None:
         raise UserError(
             f"The scenario {trial.name} prescribes the motion, so nothing tells what the vehicle was commanded. "
@@ -254,7 +254,7 @@ def _agree(trial: scenarios.Trial, record: Record, names: list[str]) -> None:
             )
 
 
-def _told_by(record: Record, names: list[str], trial: scenarios.Trial) -> scenarios.Trial:
+def _with_recorded_commands(record: Record, names: list[str], trial: scenarios.Trial) -> scenarios.Trial:
     """Return the trial with the record's commands; columns that it does not have remain those of the scenario."""
     if not names:
         wanted = ", ".join(BY_NAME[name].column for name in REPORTED_COMMANDS)

@@ -256,10 +256,10 @@ def _by_node(r: Recording, packed: np.ndarray, spends: bool) -> np.ndarray:
     once, not twice. Rows are moved from the last one on, so that no row is written over one that is still to be read.
     """
     nodes = max(int(r.nodes.max(initial=0)), 1)
-    room = packed.base if spends and packed.base is not None else packed
-    if room.shape[0] < r.nodes.size * nodes or room.shape[1:] != packed.shape[1:]:
-        room = np.empty((r.nodes.size * nodes, *packed.shape[1:]))
-    rows: np.ndarray = room[: r.nodes.size * nodes].reshape(r.nodes.size, nodes, *packed.shape[1:])
+    buffer = packed.base if spends and packed.base is not None else packed
+    if buffer.shape[0] < r.nodes.size * nodes or buffer.shape[1:] != packed.shape[1:]:
+        buffer = np.empty((r.nodes.size * nodes, *packed.shape[1:]))
+    rows: np.ndarray = buffer[: r.nodes.size * nodes].reshape(r.nodes.size, nodes, *packed.shape[1:])
     ends = np.concatenate([[0], np.cumsum(r.nodes)])
     for first in reversed(range(0, r.nodes.size, BLOCK)):
         last = min(first + BLOCK, r.nodes.size)

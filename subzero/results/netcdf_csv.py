@@ -171,12 +171,12 @@ def _forget_homeless(file: Any, found: set[str]) -> None:
 
 def _located(run: xr.Dataset, name: str) -> dict[str, str]:
     """Return the attribute that names the coordinates of a variable that are no axes of it, by the CF conventions."""
-    beside = sorted(
+    auxiliary = sorted(
         str(coord)
         for coord, values in run.coords.items()
         if coord not in run.dims and set(values.dims) <= set(run[name].dims)
     )
-    return {"coordinates": " ".join(beside)} if beside and name not in run.coords else {}
+    return {"coordinates": " ".join(auxiliary)} if auxiliary and name not in run.coords else {}
 
 
 def write_csv(run: xr.Dataset, path: Path) -> None:

@@ -187,10 +187,13 @@ def run_converged(
     coarse_times = _every_other(times)
     coarser = resolved(trial, 2.0)
     whole = Grid(times, 1, trial.stride)
+    # Without a coarser run there is nothing to compare with.
     if coarser is None or coarse_times.size < 3:
         return take(trial, whole, progress), None
+    # The coarse run is there for its force alone, so its energies and shapes are not kept.
     coarse = _taken(take, coarser, _only_traced(coarse_times, 1), _share(progress, 0.0, 0.2))
     run = take(trial, whole, _share(progress, 0.2, 0.8))
+    # The budget depends on the work of the run as asked for, which is known only now.
     budget.grant(run)
     if coarse is None:
         return run, None
@@ -200,9 +203,11 @@ def run_converged(
             break
         grid = whole._replace(parts=2**halvings)
         fine = budget.spend(take, run, 2.0, resolved(trial, 0.5**halvings), grid, progress)
+        # A finer run that stops early does not replace one that reaches the end.
         if fine is None or (run.completed and not fine.completed):
             accuracy = dataclasses.replace(accuracy, budget_spent=budget.is_spent)
             break
+        # The finer run takes the place of the run; the one before is then the coarse one.
         run, change = fine, _after_start(run, fine)
         accuracy = _accuracy(trial, take, budget, run, change, halvings)
     return run, accuracy
@@ -235,8 +240,10 @@ def prove(
     """
     latest, reached, worst, given = run, 1, 0.0, 2**accuracy.halvings
     for finer in PROOFS[: PROOFS.index(finest) + 1]:
+        # Proofs that the budget has allowed are kept, and the error is not changed.
         if not budget.allows(latest, finest / reached):
             break
+        # The finer run is sampled at the times of the run: their forces are compared there.
         grid = _only_traced(run.all_times, finer * given)
         fine = budget.spend(
             take, latest, finer / reached, resolved(trial, 1.0 / (finer * given)), grid, progress
@@ -248,6 +255,7 @@ def prove(
         accuracy = dataclasses.replace(
             accuracy, proof_error=found.size, proof_time=found.time, proof_finer=finer
         )
+        # A contradiction ends the proof: the change is then the error.
         if finer == finest or worst > accuracy.rtol:
             return dataclasses.replace(accuracy, force_error=worst)
     return accuracy
@@ -262,6 +270,7 @@ def _taken(take: Take, trial: scenarios.Trial, grid: Grid, progress: Progress | 
     """Return a run other than the requested one; None where it is refused, for memory or a start that fails."""
     try:
         return take(trial, grid, progress)
+    # A refusal, such as for memory, is a user's error elsewhere; here it means that no comparison is possible.
     except UserError:
         return None
 
@@ -293,6 +302,7 @@ def _accuracy(
     A run that will be repeated anyhow needs no look at its start.
     """
     fine_enough = change.size <= trial.rtol or not budget.allows(run, 2.0) or halvings == MOST_HALVINGS
+    # The start is checked only if no finer run follows, whose start would be checked again.
     start = _start(trial, take, budget, run, halvings) if fine_enough else Change(size=0.0, time=0.0)
     return Accuracy(
         force_error=max(change.size, start.size),
@@ -329,6 +339,7 @@ def _change(run: Run, fine: Run, first: int, largest: float) -> Change:
     The force of time 0 is a guess. Forces are compared with the `largest` of the run. [N]
     """
     rows = np.searchsorted(fine.all_times, run.all_times - 1e-9)
+    # Rows before `first` belong to the start, or to time 0, where the force is a guess.
     here = (rows < fine.all_times.size) & (rows >= first)
     if not here.any():
         return Change(size=0.0, time=0.0)

@@ -250,7 +250,7 @@ def run_trial(
 
         return run_as_printed(trial, model, progress)
     kept = keeper.next_run() if keeper is not None else None
-    now = _begun(trial, model, tethered, grid)
+    now = _initial_run_state(trial, model, tethered, grid)
     now = kept.go_on(now) if kept is not None else now
     pace = Pace()
     while now.behind < grid.times.size and _goes_on(now, grid):
@@ -298,7 +298,7 @@ SPARE_NODES = 64
 """A recording has space for twice the nodes that are expected, and so many more in each row. [-]"""
 
 
-def _begun(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> RunState:
+def _initial_run_state(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> RunState:
     """Return a run at its start, of which no row is written yet."""
     longest = float(np.diff(grid.times).max()) / grid.parts
     setup, live = prepare(trial, model, tethered, longest_exchange=longest, room=ROOM)

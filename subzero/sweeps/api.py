@@ -170,7 +170,7 @@ class _Tally:
     def __init__(self, store: Store, members: int, finished: int, progress: Progress | None) -> None:
         self._store, self._members, self._progress = store, members, progress
         self._finished, self._before = finished, finished
-        self._failed, self._begun = store.failures(), monotonic()
+        self._failed, self._started = store.failures(), monotonic()
         self._slowest, self._seconds = (-1, 0.0), 0.0
         self._report()
 
@@ -187,7 +187,7 @@ class _Tally:
     def _report(self) -> None:
         if self._progress is not None:
             count = self._finished - self._before
-            rate = count / max(monotonic() - self._begun, 1e-9)
+            rate = count / max(monotonic() - self._started, 1e-9)
             others = (self._seconds - self._slowest[1]) / max(count - 1, 1)
             from subzero.simulation.refinement import BUDGET_RATIO  # heavy, and there is no member without it
 

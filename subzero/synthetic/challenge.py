@@ -123,10 +123,10 @@ def _answer(
     seed: int,
 ) -> Answer:
     """Return the hidden effects as an answer in words."""
-    outside = hidden.outside
+    unmodelled = hidden.outside
     kind = (
         "outside"
-        if outside
+        if unmodelled
         else ("sudden" if hidden.starts else ("none", "single", "pair")[len(hidden.effects)])
     )
     named = {
@@ -137,11 +137,11 @@ def _answer(
     return Answer(
         kind=kind,
         names=hidden.names,
-        sentences=words + ((outside.sentence,) if outside else ()),
+        sentences=words + ((unmodelled.sentence,) if unmodelled else ()),
         deviations=named,
         starts=dict(hidden.starts),
-        axis=outside.axis if outside else "",
-        feature=outside.feature if outside else "",
+        axis=unmodelled.axis if unmodelled else "",
+        feature=unmodelled.feature if unmodelled else "",
         tolerances=dict(tolerances),
         scenario=scenario,
         seed=seed,

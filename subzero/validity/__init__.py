@@ -69,6 +69,7 @@ class _Supposed:
     """A run with something else in its attributes."""
 
     def __init__(self, run: AnyRun, **attrs: str) -> None:
+        # A new mapping: the attributes of the run itself are not changed.
         self._run, self.attrs = run, run.attrs | attrs
 
     def __getitem__(self, name: str, /) -> Any:
@@ -84,11 +85,13 @@ def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -
     or if the run stopped. Two cases are not doubts yet, but are checked as well: a cable without a determined
     direction at its drum, and an error that is close to the allowed one.
     """
+    # A finer run settles neither a run that stopped nor a start that finer runs have contradicted.
     if run.attrs["outcome"] != "completed" or starts_otherwise(run):
         return 0
     if not {warning.check for warning in warnings_of(run)}.intersection(DOUBTS):
         return PROOF if only_just_fits(run) or is_left_open(run, trial, model) else 0
     for finer in sorted({PROOF, DRUM_PROOF}):
+        # Suppose that the finer run agrees: the doubts that then remain cannot be settled by it.
         proved = json.loads(run.attrs["accuracy"]) | {"force_error": 0.0, "proof_finer": finer}
         supposed = _Supposed(run, accuracy=json.dumps(proved))
         if not any(CHECKS[check](supposed, trial, model) for check in DOUBTS):
@@ -99,6 +102,7 @@ def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -
 @checked_arguments
 def warnings_of(run: AnyRun) -> tuple[RunWarning, ...]:
     """Return the warnings that a run carries in its attributes; none from a version that did not know them."""
+    # Older versions did not save warnings; their runs have none.
     reported = json.loads(run.attrs.get("warnings", "[]"))
     return tuple(RunWarning(each["check"], each["message"]) for each in reported)
 

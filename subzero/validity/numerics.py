@@ -59,6 +59,7 @@ def energy_residual(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
         return []  # whatever moves the vehicle does unknown work
     residual = np.abs(run["energy_residual"].values)
     largest = float(np.abs([run[f"energy_{name}"].values for name in ENERGIES]).max())
+    # Residuals are compared with the largest energy: without one there is nothing to compare.
     if not (np.isfinite(residual).all() and np.isfinite(largest)) or largest < NO_ENERGY:
         return []
     share = residual / largest
@@ -77,11 +78,13 @@ def resolution(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
     `subzero.simulation.refinement`.
     """
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
+    # Without an accuracy no coarser run was made.
     if not accuracy or is_resolved(run):
         return []
     finer = f"({2 ** accuracy['halvings']} times as fine as given)"
     asked = f"run.rtol allows {percent(trial.rtol)}"
     start, change = _share(accuracy["start_error"]), _share(accuracy["change"])
+    # A contradiction by a finer run is the strongest evidence, so it is reported first.
     if accuracy["proof_error"] > trial.rtol:
         same = "" if change > trial.rtol else ", though with twice as long ones it is the same"
         return [
@@ -89,6 +92,7 @@ def resolution(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
             f"they change it by {_percent(accuracy['proof_error'])} (at {accuracy['proof_time']:g} s; {asked}){same}. "
             "Give the drum friction_torque or a [winch], or the cable bending_stiffness."
         ]
+    # An error in the start only has another cause, and another remedy.
     if start > max(trial.rtol, change):
         return [
             f"The tow force of the start depends on steps and segments: four times as fine as these {finer} they "
@@ -160,6 +164,7 @@ def tow_force(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
     """
     if not run.attrs["tethered"] or is_resolved(run):
         return []
+    # Second differences lose one sample at each end, and the force of time 0 is a guess.
     jump, time = roughness(run), run["time"].values[2:-1]
     for kink in model.winch.time[1:] if model.winch is not None and jump.size else ():
         jump = np.where(np.abs(time - kink) <= trial.cable_step * (1.0 + 1e-6), 0.0, jump)
@@ -193,11 +198,13 @@ def ill_posed_drum(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     T, payout, away = run["drum_tension"].values, np.gradient(S, time), _tow_speed(run, time)
     ill = drum_is_ill_posed(T, payout, away, model.cable, model.drum)
     momentum = model.cable.virtual_mass_per_length * payout**2
+    # A confirmed force leaves the second case only: where m1 U² > T, no waves come back to the drum.
     if is_resolved(run):
         ill &= momentum > T
     longest, begin = longest_span(time, ill)
     if longest <= ILL_POSED_TIME:
         return []
+    # The worst sample is taken from the longest stretch, which the sentence is about.
     here = ill & (time >= begin) & (time <= begin + longest)
     worst = int(np.where(here, payout, -np.inf).argmax())
     return [
@@ -222,6 +229,7 @@ def is_left_open(run: AnyRun, trial: scenarios.Trial, model: Model) -> bool:
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
     if model.winch is not None or not accuracy:
         return False
+    # The segments of the run after its halvings.
     cable, segment = model.cable, trial.segment_length / 2.0 ** accuracy["halvings"]
     is_hidden = segment * cable.tangential_drag > cable.virtual_mass_per_length
     if is_hidden and _share(accuracy["force_error"]) <= BARELY * accuracy["rtol"]:
@@ -249,11 +257,13 @@ def load_across(run: AnyRun, model: Model) -> np.ndarray:
     The current is that at the drum; along the cable it only adds to the pay-out rate.
     """
     time, P, nodes = run["time"].values, run["cable_position"].values, run["node_count"].values
+    # Rows without cable have no last segment; index 1 keeps the indexing valid.
     rows, last = np.arange(time.size), np.maximum(nodes - 1, 1)
     drum, side = P[rows, last], P[rows, last - 1] - P[rows, last]
     along = side / np.maximum(np.linalg.norm(side, axis=1, keepdims=True), np.finfo(float).tiny)
     water = model.water()
     flow = np.array([water.at(place, when) for place, when in zip(drum, time, strict=True)])
+    # The drum may be on a moving vessel: the flow relative to it counts.
     flow = flow - np.gradient(drum, time, axis=0)
     flow -= np.sum(flow * along, axis=1, keepdims=True) * along
     load = model.cable.normal_drag * np.linalg.norm(flow, axis=1, keepdims=True) * flow
@@ -288,6 +298,7 @@ def drum_is_ill_posed(
         drum: the drum, with its friction.
     """
     held = drum.friction_torque / drum.radius
+    # A tension at the friction of the drum, or below it, cannot turn the drum.
     unwinds = (cable.weight_in_water > 0.0) & (tension <= held * (1.0 + 1e-3) + LIMP)
     unwinds &= payout > OVERRUN * tow_speed
     square = payout * payout
@@ -352,6 +363,7 @@ def slack_share(run: AnyRun) -> np.ndarray:
 
 def closure(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
     """The cable does not end at the tow point."""
+    # The length at its largest so far: a cable that is reeled in keeps the tolerance of its longest shape.
     gap, S = run["closure_error"].values, np.maximum.accumulate(run["cable_length"].values)
     open_ = gap > CLOSED * np.maximum(S, trial.segment_length)
     if not open_.any():
@@ -391,6 +403,7 @@ def _chords(P: np.ndarray) -> np.ndarray:
     """Return the distances between neighbouring nodes, 0 behind the last (samples, nodes − 1). [m]."""
     x, y, z = np.moveaxis(np.diff(P, axis=1), 2, 0)
     lengths: np.ndarray = np.sqrt(x * x + y * y + z * z)
+    # Rows are padded with NaN after the last node.
     lengths[np.isnan(lengths)] = 0.0
     return lengths
 
@@ -398,6 +411,7 @@ def _chords(P: np.ndarray) -> np.ndarray:
 def _tow_speed(run: AnyRun, time: np.ndarray) -> np.ndarray:
     """Return the speed of the tow point relative to the drum (samples,). [m/s]."""
     P, nodes = run["cable_position"].values, run["node_count"].values
+    # The drum is the last node of each row, and rows differ in their number of nodes.
     drum = P[np.arange(time.size), np.maximum(nodes - 1, 0)]
     speed: np.ndarray = np.linalg.norm(np.gradient(P[:, 0] - drum, time, axis=0), axis=1)
     return speed
