@@ -1,4 +1,4 @@
-"""The cable: a thin, flexible, growing line in water, pulled off a drum; it knows no vehicle.
+"""The cable: a thin, flexible, growing line in water, pulled off a drum; it is independent of any vehicle.
 
 Everything is SI, earth axes are north, east, down, positions are relative to the drum. The arc length s runs from
 the tow point to the drum, the tangent t points that way, so V_t is negative while cable is pulled out.

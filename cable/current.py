@@ -34,7 +34,7 @@ class Water(NamedTuple):
 
     Attributes:
         points: where the cable's positions are zero on the grid's axes (3 numbers), how many points the axes time,
-            north, east and down have (4), and these points, one axis behind another. [m], [s]
+            north, east and down have (4), and these points, one axis after another. [m], [s]
         velocity: north, east, down at the grid points, down running fastest (points of the grid, 3). [m/s]
     """
 

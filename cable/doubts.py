@@ -17,7 +17,7 @@ import numpy as np
 RESIDUAL = 0.01
 """A residual above this share of the largest energy of the run is too much. [-]"""
 NO_FORCE = 1e-6
-"""A smaller force is none. [N]"""
+"""A smaller force counts as zero. [N]"""
 ROUGH = 0.03
 """A tow force whose second difference from sample to sample exceeds this share of the largest force is not resolved by
 the steps. Of 160 trials of `benchmarks.trust` all 117 that were wrong by more than 3 % had more, and none of the 13
@@ -50,7 +50,7 @@ def slack_share(length: np.ndarray, chord: np.ndarray, tension: np.ndarray) -> n
 
     Args:
         length: of the cable (samples,). [m]
-        chord: distances between neighbouring nodes (samples, nodes − 1), 0 behind the last. [m]
+        chord: distances between neighbouring nodes (samples, nodes − 1), 0 after the last. [m]
         tension: at the nodes (samples, nodes). [N]
     """
     length = np.maximum(length, 1e-9)

@@ -45,7 +45,7 @@ TINY_SPEED = 1e-12
 MOST_COASTING = 60
 """Most iterations for the speed of a coasting drum."""
 HELD = 1e-12
-"""A tension or pay-out rate below this is none. [N], [m/s]"""
+"""A tension or pay-out rate below this counts as zero. [N], [m/s]"""
 
 
 class DrumNumbers(Record):
@@ -54,7 +54,7 @@ class DrumNumbers(Record):
     Attributes:
         inertia: I_d/R_d². [kg]
         friction: C_f/R_d. [N]
-        control: who decides on the pay-out, `FREE`, `LENGTH` or `TENSION`.
+        control: the quantity that determines the pay-out, `FREE`, `LENGTH` or `TENSION`.
         setpoint: commanded value at the new time: length [m] or tension [N]; without meaning for a free drum.
         place, velocity: of the drum at the new time, relative to its place at the start (3,). [m], [m/s]
     """
@@ -68,7 +68,7 @@ class DrumNumbers(Record):
 
     @classmethod
     def at_rest(cls, *, inertia: float = 0.0, friction: float = 0.0, control: int = FREE) -> DrumNumbers:
-        """Return the numbers of a drum that stands where it stood at the start."""
+        """Return the numbers of a drum that remains where it was at the start."""
         return cls(inertia, friction, control, 0.0, np.zeros(3), np.zeros(3))
 
 
@@ -91,7 +91,7 @@ class DrumProperties:
     friction_torque: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a drum."""
+        """Raise an error if the fields do not describe a possible drum."""
         for name in ("radius", "inertia", "friction_torque"):
             above = 0.0 if name == "radius" else None
             value = checked("DrumProperties", name, getattr(self, name), least=0.0, above=above)
@@ -116,7 +116,7 @@ def next_mode(mode: int, converged: bool, payout: float, loose: float, pull: flo
     problem is ill-posed, and the drum is taken to stand.
 
     Args:
-        mode: what was supposed.
+        mode: the assumed state.
         converged: whether a solution was found with it.
         payout: rate at which the water takes cable in that solution. [m/s]
         loose: length that lies loose before the drum then. [m]

@@ -1,4 +1,4 @@
-"""Where a drum goes, and what its winch is asked for: a table over time, cubic (places) and linear in between.
+"""The motion of a drum, and the setpoint of its winch: a table over time, cubic (places) and linear in between.
 
 Columns: time [s], place and velocity of the drum relative to its place at the start, earth axes [m], [m/s], and what a
 winch is asked for, length [m] or tension [N]. One array, for few arguments compile sooner.

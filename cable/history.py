@@ -211,7 +211,7 @@ class History:
 
 
 def _filled(rows: Sequence[np.ndarray]) -> np.ndarray:
-    """Return arrays of nodes (nodes, …) in rows of equal length (n, most nodes, …), NaN behind the last node."""
+    """Return arrays of nodes (nodes, …) in rows of equal length (n, most nodes, …), NaN after the last node."""
     filled = np.full((len(rows), max(map(len, rows)), *rows[0].shape[1:]), np.nan)
     for row, values in zip(filled, rows, strict=True):
         row[: len(values)] = values
@@ -223,7 +223,7 @@ class Equilibrium:
     """A cable at rest between two ends.
 
     Attributes:
-        cable: what it is made of.
+        cable: the cable's properties.
         current: how the water moves.
         length: unstretched. [m]
         shape: node positions from the first end to the second, in the axes of `ends` (nodes, 3). [m]

@@ -158,7 +158,7 @@ def _positive(name: str, given: object) -> float:
 
 
 def _checked_length(places: np.ndarray, given: float, cable: CableProperties) -> float:
-    """Return the length; raise an error if no cable of that length reaches, or if it is none. [m]."""
+    """Return the length; raise an error if no cable of that length reaches, or if it is not a length. [m]."""
     length = _positive("length", given)
     apart = float(np.linalg.norm(places[0] - places[1]))
     if cable.compliance == 0.0 and apart >= TAUT * length:

@@ -28,7 +28,7 @@ def free_memory() -> float:
 
 
 def fits(size: float) -> bool:
-    """Say whether so many bytes can be had."""
+    """Return whether so many bytes can be had."""
     return size <= SMALL or size <= SHARE * free_memory()
 
 

@@ -68,7 +68,7 @@ class CableProperties:
     minimum_bend_radius: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a cable."""
+        """Raise an error if the fields do not describe a possible cable."""
         for each in fields(self):
             above = 0.0 if each.name in ABOVE_ZERO else None
             value = checked(type(self).__name__, each.name, getattr(self, each.name), least=0.0, above=above)

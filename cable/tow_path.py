@@ -103,7 +103,7 @@ SHORTEN = "Record less often (a longer step), or take longer segments (segment_l
 
 
 def check_memory(rows: int, segments: int) -> None:
-    """Refuse a run of so many results with shapes of so many segments if it does not fit into memory."""
+    """Raise an error if a run of so many results with shapes of so many segments does not fit into memory."""
     size = rows * (segments + 2.0) * BYTES_A_NODE + segments * BYTES_A_SEGMENT
     what = f"A run of {rows} results with up to {segments} segments each"
     refuse_unless_it_fits(size, what, SHORTEN)

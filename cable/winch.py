@@ -57,7 +57,7 @@ class PayOutRate:
 
 @dataclass(frozen=True, kw_only=True)
 class Brake:
-    """A drum that stands."""
+    """A drum that is held."""
 
     def numbers(self) -> DrumNumbers:
         """Return the plain numbers that compiled code takes."""

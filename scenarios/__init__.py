@@ -88,7 +88,7 @@ def load(
         motion_csv: a CSV file of a motion that replaces the commands or the motion of the scenario, and what its start
             says besides the cable.
         check_vehicle: takes the numbers of the vehicle and gives what its own equations find wrong with them,
-            as objects with the attributes key, found, why, allowed. (This package knows no vehicle.)
+            as objects with the attributes key, found, why, allowed. (This package does not depend on the vehicle.)
 
     Raises:
         ScenarioError: with every problem of every file.

@@ -1,4 +1,4 @@
-"""Refuse values where they are made, whoever makes them, a file or Python: by the limits of `quantities`.
+"""Validation of values where they are made, by a file or in Python: by the limits of `quantities`.
 
 >>> import scenarios
 >>> scenarios.Start(heading=27.0)
@@ -103,7 +103,7 @@ class Checks:
         return False
 
     def mapping(self, name: str) -> None:
-        """Check that a field holds numbers by name, in tables if need be; what they mean is checked by who knows."""
+        """Check that a field holds numbers by name, in tables if necessary; their meaning is checked elsewhere."""
         table = getattr(self._value, name)
         if not isinstance(table, Mapping):
             self.say(name, "this is no mapping", "Allowed: key → number.", table)
@@ -173,7 +173,7 @@ class Checks:
 
 
 def _all_finite(table: Mapping[str, Any]) -> bool:
-    """Say whether all of a table, and of the tables in it, is a finite number."""
+    """Return whether all of a table, and of the tables in it, is a finite number."""
     for inside in table.values():
         if not (_all_finite(inside) if isinstance(inside, dict) else real(inside) is not None):
             return False

@@ -23,10 +23,10 @@ from scenarios.trial import Trial
 from subzero.errors import printable
 
 SENTENCE_END = re.compile(r"(?<=[\w)]{2})\. (?=[A-Z])")
-"""A stop behind a whole word, which an initial is not."""
+"""A full stop after a whole word, which an initial is not."""
 
 LONGEST = 160
-"""A sentence is cut behind so many letters."""
+"""A sentence is cut after so many letters."""
 
 FOLDERS = {"trial": "trials", "vehicle": "vehicles", "cable": "cables"}
 """Kind of file → the folder of those that are shipped."""

@@ -145,7 +145,7 @@ def read_toml(path: Path, name: str) -> Source:
 
 
 def _is_deep(table: dict[str, Any]) -> bool:
-    """Say whether a file is nested deeper than any of ours has reason to be."""
+    """Return whether a file is nested deeper than any of ours has reason to be."""
     level: list[Any] = [table]
     for _ in range(MOST_LEVELS):
         inside = [each for thing in level for each in (thing.values() if isinstance(thing, dict) else thing)]

@@ -45,7 +45,7 @@ class Commands:
     values: np.ndarray
 
     def __post_init__(self) -> None:
-        """Refuse what are no commands; keep arrays of their own that cannot be changed."""
+        """Raise an error if the fields do not form commands; keep arrays of their own that cannot be changed."""
         check = Checks(self)
         time = check.rows("time", COMMANDS[:1])
         values = check.rows("values", COMMANDS[1:], None if time is None else time.size)
@@ -159,7 +159,7 @@ def interpolation_of(given: Collection[str], asked: str | None) -> str:
 
 
 def motion_faults(given: Collection[str], asked: str | None) -> list[tuple[str, str, str]]:
-    """Return what does not fit in a motion that gives some fields: the field, why, and what to do."""
+    """Return the problems of a motion that gives some fields: the field, the reason, and the remedy."""
     faults = []
     more = [name for name in given if name not in REQUIRED]
     if not (asked is None or (isinstance(asked, str) and asked in INTERPOLATIONS)):  # asked may be an array

@@ -237,7 +237,7 @@ def _part(source: Source, kind: str, named: str) -> tuple[Part, Source]:
 
 
 def _source_of(trial: Trial) -> Source:
-    """Return the file of a trial again, from what it keeps of it."""
+    """Return the file of a trial again, from the sources that it keeps."""
     table = tomllib.loads(trial.text) if trial.text else {}
     return Source(name=trial.source, folder=Path(trial.source).parent, text=trial.text, table=table, lines={})
 
@@ -254,7 +254,7 @@ def _part_rows() -> dict[str, Leaf]:
 
 
 def _known(trial: Trial) -> dict[str, tuple[Row, np.ndarray]]:
-    """Return dotted name → what it is, and its value or values (n,), in the unit of the files."""
+    """Return dotted name → its quantity, and its value or values (n,), in the unit of the files."""
     known: dict[str, tuple[Row, np.ndarray]] = {}
     for name, row in _part_rows().items():
         known[name] = row, np.array([_part_value(trial, name)])
@@ -270,7 +270,9 @@ def _known(trial: Trial) -> dict[str, tuple[Row, np.ndarray]]:
 
 
 def _row(trial: Trial, name: str) -> tuple[Row, int] | None:
-    """Return what a number is, and of how many a list has; None if there is none. Quick for single numbers."""
+    """Return the quantity of a number, and the length of its list; None if there is none. Quick for single
+    numbers.
+    """
     section, _, key = name.partition(".")
     if section in PARTS:
         row = _part_rows().get(name)

@@ -81,7 +81,7 @@ def load(
         motion_csv: a CSV file of a motion that replaces the commands or the motion of the scenario, and what its start
             says besides the cable.
         check_vehicle: takes the numbers of the vehicle and gives what its own equations find wrong with them,
-            as objects with the attributes key, found, why, allowed. (This package knows no vehicle.)
+            as objects with the attributes key, found, why, allowed. (This package does not depend on the vehicle.)
 
     Raises:
         ScenarioError: with every problem of every file.
@@ -210,7 +210,7 @@ def _start(start: Mapping[str, Any], prescribed: Motion | None) -> Start:
 
 
 def check_steps(source: Source, run: Mapping[str, float], start: Mapping[str, float]) -> list[Problem]:
-    """Return what does not fit in [run] and [start], as far as their numbers are good by themselves.
+    """Return the inconsistencies of [run] and [start], as far as their numbers are valid by themselves.
 
     Args:
         source: the trial file, for the lines in messages.
@@ -349,7 +349,7 @@ def _read_vessel(source: Source) -> Read:
 
 
 def check_scheme(source: Source, run: Mapping[str, Any], cable: Mapping[str, float]) -> list[Problem]:
-    """Return what a trial and its cable ask for that only the default scheme knows, if [run] asks for another one."""
+    """Return features of a trial and its cable that only the default scheme has, if [run] asks for another one."""
     scheme, table = run.get("scheme", SCHEMES[0]), source.table
     if scheme == SCHEMES[0]:
         return []

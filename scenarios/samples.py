@@ -205,7 +205,7 @@ def check_times(samples: Samples, duration: float | None) -> list[Problem]:
     """Return the problems of the times: they start at 0, increase, and a log lasts as long as the run.
 
     Args:
-        samples: what was read.
+        samples: the samples that were read.
         duration: how long the run lasts; None if that is not known, because it is wrong itself. [s]
     """
     time = samples.time
@@ -225,7 +225,7 @@ def check_times(samples: Samples, duration: float | None) -> list[Problem]:
 
 
 def check_motion(samples: Samples) -> list[Problem]:
-    """Return what does not fit in the columns of a motion, each by itself right."""
+    """Return the inconsistencies of the columns of a motion, each valid by itself."""
     names = {name: quantity.name for name, quantity in by_field(MOTION).items()}
     given = [name for name, column in names.items() if column in samples.columns]
     section = "" if samples.lines else "motion."
@@ -334,7 +334,7 @@ def _whole(header: list[str], rows: list[Row]) -> list[Row]:
 def _columns(
     name: str, header: list[str], rows: list[Row], quantities: Iterable[Quantity]
 ) -> tuple[dict[str, list[float]], list[Problem]]:
-    """Return the columns we know, NaN where a cell cannot be used, and the problems of those cells."""
+    """Return the known columns, NaN where a cell cannot be used, and the problems of those cells."""
     columns: dict[str, list[float]] = {}
     problems: list[Problem] = []
     for quantity in quantities:

@@ -1,4 +1,4 @@
-"""What a trial file may say: pydantic models made from the table of quantities, which speak in our words.
+"""The schema of a trial file: pydantic models made from the table of quantities, with messages in our words.
 
 Only here is pydantic imported, and only when a file is read. Every section is checked by itself, so a mistake
 in one does not hide those in another. Checks that compare several values live in `scenarios.reader`.

@@ -44,7 +44,7 @@ ONLY_DEFAULT = "the paper's scheme knows a limp cable on a free drum on the shor
 
 
 def only_default(asked: list[str]) -> str:
-    """Return what to do about things that only the default scheme knows."""
+    """Return the remedy for features that only the default scheme has."""
     return f'Set scheme = "{SCHEMES[0]}", or leave out {" and ".join(asked)}.'
 
 

@@ -66,7 +66,7 @@ class Channel:
         name: name in datasets and in the API.
         unit: display unit, in which results carry it.
         symbol: symbol of the source, for the axis of a figure (matplotlib mathtext).
-        long_name: what it is, in words, with its sign where there are two.
+        long_name: its name in words, with its sign where there are two.
     """
 
     name: str

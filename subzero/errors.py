@@ -28,7 +28,7 @@ SHOWN_PROBLEMS = 12
 """So many problems of one file are spelt out: enough to repair it, few enough to read on one screen."""
 
 LONGEST_PROBLEM = 1000
-"""A problem is cut behind so many characters: a file may hold a key of any length."""
+"""A problem is cut after so many characters: a file may hold a key of any length."""
 
 
 class UserError(Exception):
@@ -153,7 +153,7 @@ def short(value: object) -> str:
     """Return a value as it is shown in a message: `repr`, on one line, cut when long."""
     try:
         text = repr(value)
-    except Exception:  # whatever somebody's __repr__ does
+    except Exception:  # a user's __repr__ may do anything
         is_number = isinstance(value, Integral)  # one of thousands of digits has no text
         return "a number far too long" if is_number else f"a value of type {type(value).__name__}"
     text = " ".join(text.split())

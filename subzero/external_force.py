@@ -135,7 +135,7 @@ class MissingForce:
     terms: tuple[Term, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse a history that cannot be one."""
+        """Raise an error if the fields do not form a history."""
         try:
             time, wrench = np.array(self.time), np.array(self.wrench)
         except (ValueError, TypeError, OverflowError):

@@ -69,7 +69,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
     300 steps; it ends early only if the simulation cannot go on.
 
     Args:
-        scenario: where the vehicle starts, with what cable; its commands are not used.
+        scenario: the start of the vehicle, and its cable; its commands are not used.
         propeller_rps: constant propeller command. [rev/s]
         tethered: with the cable.
         sample_time: of an action. [s]
@@ -189,7 +189,9 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
 
 
 def _shares(actions: Any, count: int) -> list[float]:
-    """Return so many rudders, each as a share of its limit, or refuse what are none; plain code, as it is in loops."""
+    """Return so many rudders, each as a share of its limit; raise an error for others; plain code, as it is in
+    loops.
+    """
     try:
         if not isinstance(actions, Sequence) or len(actions) == count:
             given = np.asarray(actions)
@@ -242,7 +244,7 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
 
     @staticmethod
     def _held_one(env: TetheredHeading, rudder: float, is_over: bool) -> tuple[float, bool]:
-        """Step one environment, or let it begin again where its episode is over."""
+        """Step one environment, or start it again where its episode is over."""
         if is_over:
             env.reset()
             return 0.0, False
@@ -260,7 +262,7 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         return values | {f"_{name}": np.ones(self.num_envs, dtype=bool) for name in TRUTH}
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Let the threads end."""
+        """End the threads."""
         super().close_extras(**kwargs)
         self._pool.shutdown()
 

@@ -44,7 +44,7 @@ class Section:
     """A part of a vehicle: a frozen dataclass of `parameter` fields, checked when it is made."""
 
     def __post_init__(self) -> None:
-        """Refuse numbers that cannot be; raises VehicleError."""
+        """Raise VehicleError for numbers that are not possible."""
         problems = []
         for name, field in _fields(type(self)).items():
             value = getattr(self, name)
@@ -93,7 +93,7 @@ def parameter(
 
 
 def allowed_values(field: dataclasses.Field[Any]) -> str:
-    """Say in words which values a field may take, with the unit."""
+    """Return in words which values a field may take, with the unit."""
     low, high, unit = field.metadata["low"], field.metadata["high"], field.metadata["unit"]
     bounds = []
     if low > -math.inf:
@@ -104,7 +104,7 @@ def allowed_values(field: dataclasses.Field[Any]) -> str:
 
 
 def is_plainly_right(value: object, field: dataclasses.Field[Any]) -> bool:
-    """Say whether a value is a float within its limits, as most are: a tenth of the time of `check_value`."""
+    """Return whether a value is a float within its limits, as most are: a tenth of the time of `check_value`."""
     if type(value) is not float:
         return False
     limits, low = field.metadata, field.metadata["low"]

@@ -37,7 +37,7 @@ INERTIAL, PROPULSION, LOSS, RESTORING, EXTERNAL = -1, 0, 1, 2, 3
 
 
 class Term(NamedTuple):
-    """A named force: what it is, and which power it makes."""
+    """A named force: its name, its meaning, and the power that it belongs to."""
 
     name: str
     meaning: str

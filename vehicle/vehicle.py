@@ -85,7 +85,7 @@ class Vehicle:
     tow_point: TowPoint
 
     def __post_init__(self) -> None:
-        """Refuse parts that are none, or do not fit; raises VehicleError."""
+        """Raise VehicleError for parts that are not valid, or do not fit."""
         problems = [
             Problem(
                 key=name, found=short(getattr(self, name)), why="this is no such part", allowed=kind.__name__
@@ -151,7 +151,7 @@ class Vehicle:
 
 @lru_cache(maxsize=4)
 def _numbers_of(vehicle: Vehicle) -> VehicleNumbers:
-    """Return the numbers of one of the last few vehicles: each run of a sweep has one that is made anew, and alike."""
+    """Return the numbers of one of the last few vehicles: each run of a sweep makes an equal one again."""
     try:
         with np.errstate(all="ignore"):
             numbers = vehicle._numbers()

@@ -51,7 +51,7 @@ LARGEST_TURN = 1.0
 
 
 NOTHING = 1e-9
-"""Less cable than this [m] in a step is none: a thousandth of its diameter would be more."""
+"""Less cable than this [m] in a step counts as zero: a thousandth of its diameter would be more."""
 
 
 class NewtonReport(NamedTuple):

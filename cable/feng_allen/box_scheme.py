@@ -59,7 +59,7 @@ SLACK_TOLERANCE = 1e-6
 def solve_stage(
     w: BoxWorkspace, a: float, end_history: float, ends: Ends, c: Equation7Numbers
 ) -> NewtonReport:
-    """Solve ẏ = a (y − h) with the moving end; let the drum stand while the cable would run back."""
+    """Solve ẏ = a (y − h) with the moving end; the drum is held while the cable would run back."""
     rule = BoxRule(1.0, 1.0, a, True, end_history)
     last = w.count[0] - 1
     report = solve_boxes(w, rule, ends, c)

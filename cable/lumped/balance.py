@@ -1,4 +1,4 @@
-"""The balance of momentum of the free nodes, with its slopes: what a node is asked for minus what it gets.
+"""The balance of momentum of the free nodes, with its slopes: required minus available force of a node.
 
     R_j = (w_j p_j − P*_j)/g + w_j f_j + T_j t_j − T_{j+1} t_{j+1} − B_j,      w_j = ½(ℓ_j + ℓ_{j+1})
 

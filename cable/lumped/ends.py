@@ -207,8 +207,8 @@ def turning(rope: Rope, g: float, drum: DrumNumbers) -> tuple[float, float]:
 
 @inner
 def is_first_order(rope: Rope) -> bool:
-    """Say whether cable is loose, or was so lately: then the drum is advanced to first order, over the whole step, so
-    that its force is the mean of what it takes.
+    """Return whether cable is loose, or was so lately: then the drum is advanced to first order, over the whole step,
+    so that its force is the mean of what it takes.
     """
     return rope.ends.since_loose < SMOOTH_STEPS or rope.ends.loose[MIDDLE] > 0.0
 

@@ -8,7 +8,7 @@ and ξ, its own unknown, L − ℓ (1 + ε(ξ)) = 0. Newton's step for ξ follow
 
     δξ = (L − ℓ(1 + ε) + ∂L/∂ΔV·δΔV − (1 + ε) δℓ) / (ℓ ε'),
 
-so ξ is eliminated spring by spring, and the springs may be as stiff as one likes.
+so ξ is eliminated spring by spring, and the springs may be arbitrarily stiff.
 
 The springs of the lumped cable: hardly any stretch when taut, hardly any push when slack.
 

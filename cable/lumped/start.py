@@ -1,4 +1,4 @@
-"""How a run of the lumped cable begins: straight, in steady motion, with what the drum holds."""
+"""The initial state of the lumped cable: straight, in steady motion, with the tension that the drum holds."""
 
 from __future__ import annotations
 

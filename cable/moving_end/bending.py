@@ -34,7 +34,7 @@ def _add_bending(line: Line, c: StiffCableNumbers) -> None:
 
 @allocating
 def _bend(line: Line, stiffness: float) -> None:
-    """Do that for all segments."""
+    """Add bending for all segments; the compiled part of `_add_bending`."""
     # `assemble` fills the three inner diagonals; the outer two are filled here only.
     for j in range(1, line.ends.count + 1):
         for i in range(4):
@@ -173,7 +173,7 @@ def _solve(line: Line, c: CableNumbers) -> bool:
 
 @inner
 def _stiff_solve(line: Line, c: StiffCableNumbers) -> bool:
-    """Do the same for five diagonals of blocks."""
+    """Solve like `_solve`, with five diagonals of blocks."""
     if factor_wide(line.blocks, line.pivots, line.ends.count) > 0:
         return False
     solve_wide(line.blocks, line.pivots, line.ends.count, line.rows[RESIDUAL])
@@ -183,13 +183,15 @@ def _stiff_solve(line: Line, c: StiffCableNumbers) -> bool:
 
 @inner
 def _has_residual(line: Line, c: CableNumbers) -> bool:
-    """Say whether a residual can be had without the matrix: not for a single segment, whose equations are its own."""
+    """Return whether a residual can be computed without the matrix: not for a single segment, which has its own
+    equations.
+    """
     return line.ends.count > 1
 
 
 @inner
 def _no_residual(line: Line, c: StiffCableNumbers) -> bool:
-    """Say no: bending fills residual and matrix at once."""
+    """Return False: bending fills residual and matrix at once."""
     return False
 
 

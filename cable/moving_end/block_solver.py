@@ -188,7 +188,7 @@ def _less_four(a: Four, f: float, b: Four) -> Four:
 
 @inlined
 def _behind(a: Row) -> Four:
-    """Return what stands in a row behind D_j."""
+    """Return the part of a row after D_j: r_j, then L_j without its first column."""
     return a[4], a[5], a[6], a[7]
 
 

@@ -10,7 +10,7 @@ With drag quadratic in speed the tangential part wants V̄_t² (1 + θ²/2). It 
 speed: ΔV, the change of velocity over the segment, is V_t θ for a cable that slides along its own curve, and does not
 make one slip that merely turns.
 
-Across, the middle of a segment has V̄ = V + ⅛ℓ²V'', and ½(Q_j + Q_{j+1}) wants q − ℓ²q''/12 in the place of q. How far
+Across, the middle of a segment has V̄ = V + ⅛ℓ²V'', and ½(Q_j + Q_{j+1}) wants q − ℓ²q''/12 instead of q. How far
 the cable slides along its own curve, λ with ΔV = λU_tθ, says both: U_n' = −κ(1 − λ)U_t, and V''·n = λκ²U_n. So the part
 of the normal drag that lies in the plane of the curve wants a `normal_gain` of
 

@@ -57,9 +57,9 @@ def drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load, slopes: bool
 
 @inner
 def drum_history(line: Line, w: Weights) -> tuple[float, float, float]:
-    """Return the weights of the drum's new speed in its acceleration and of the new length in its speed [1/s], and what
-    the speeds before add to the acceleration [m/s²]. Of first order while cable is loose, and until the jerk that ends
-    that is two steps behind.
+    """Return the weights of the drum's new speed in its acceleration and of the new length in its speed [1/s], and
+    the part of the acceleration that the speeds before give [m/s²]. They are of first order while cable is loose, and
+    until two steps after the jerk that ends that.
     """
     U, ahead = line.ends.payout, line.ends.ahead
     if line.ends.since_loose < KNOWN_STEPS:

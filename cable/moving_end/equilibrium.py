@@ -51,7 +51,8 @@ ROUNDINGS = 5
 STILL = 1e-11
 """A cable at rest has moved by no more than this share of its length since water and arcs were last looked at."""
 WAVERS = 0.9
-"""A step that moves the cable by more than this share of what the one before did goes to and fro: try a shorter one."""
+"""A step that moves the cable by more than this share of the motion of the step before oscillates: try a shorter
+one."""
 LOOSER = 1e-7
 """Where a cable is so taut that rounding does not let it be solved to `schemes.TOLERANCE`, this will do."""
 LOOKS = 400
@@ -68,7 +69,7 @@ def _length(line: Line, j: int) -> float:
 
 @allocating
 def hang(line: Line, water: Water, c: CableNumbers, work: Load) -> float:
-    """Lay the line as a chain under loads that do not turn with it, and take the drag anew a few times.
+    """Lay the line as a chain under loads that do not turn with it, and compute the drag again a few times.
 
     Args:
         line: with the places of its first and last node, and the lengths of its segments.
@@ -221,7 +222,9 @@ def _solve_three(A: np.ndarray, b: np.ndarray, out: np.ndarray) -> bool:
 
 @inner
 def _lay(line: Line, F: np.ndarray, e: float) -> None:
-    """Fill places and tensions of level NEW from the force at the first end; what does not close is shared out."""
+    """Fill places and tensions of level NEW from the force at the first end; the closing error is spread over the
+    nodes.
+    """
     N, x = line.ends.count, line.position
     for i in range(3):
         x[NEW, 0, i] = x[NOW, 0, i]
@@ -266,8 +269,8 @@ def _keep(line: Line, c: CableNumbers, work: Load) -> None:
 def relax(line: Line, water: Water, c: CableNumbers, drum: DrumNumbers, work: Load) -> int:
     """Take steps from rest, the first one without inertia, until nothing moves; return how many, or −1.
 
-    Tensions should be of about 1 N, as those that `time_step` was made for: rest does not know the size of forces, so
-    weight, drag and stiffness can be divided by any number, and the compliance multiplied by it.
+    Tensions should be of about 1 N, as those that `time_step` was made for: rest does not depend on the size of
+    forces, so weight, drag and stiffness can be divided by any number, and the compliance multiplied by it.
 
     Args:
         line: with places and tensions at level NOW.
@@ -294,7 +297,7 @@ def relax(line: Line, water: Water, c: CableNumbers, drum: DrumNumbers, work: Lo
         if step > LONGEST and moved <= STILL * whole:
             fill_node_tensions(line)
             return k + 1
-        # The cable goes to and fro: a shorter step follows its motion.
+        # The cable oscillates: a shorter step follows its motion.
         if moved > WAVERS * last and moved > 1e-6 * whole:
             step = 0.3 * min(step, LONGEST)
         elif moved < 0.5 * last or step > LONGEST:

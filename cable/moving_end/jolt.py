@@ -27,7 +27,7 @@ from cable.properties import CableNumbers
 from subzero.jit import allocating, inlined, inner
 
 FELT = 1e-6
-"""A jump of the tow point's velocity smaller than this is none. [m/s]"""
+"""A jump of the tow point's velocity smaller than this counts as zero. [m/s]"""
 LOOSE = 1e-6
 """Loose cable shorter than this is rounding. [m]"""
 SLACK_FOR = 0.01
@@ -38,7 +38,7 @@ SLACK_FOR = 0.01
 def take_jolt(
     line: Line, change: np.ndarray, c: CableNumbers, drum: DrumNumbers, work: Load, out: np.ndarray
 ) -> bool:
-    """Give a line, at level NOW, the velocities that it has just after a jolt; say whether it was taken.
+    """Give a line, at level NOW, the velocities that it has just after a jolt; return whether it was taken.
 
     Args:
         line: the cable.
@@ -177,13 +177,13 @@ def _assemble_drum(line: Line, tangents: np.ndarray, M: np.ndarray, drum: DrumNu
 
 @inlined
 def _is_ahead(line: Line) -> bool:
-    """Say whether loose cable keeps a jolt from the drum."""
+    """Return whether loose cable keeps a jolt from the drum."""
     return line.ends.drum_mode == SPINNING and line.ends.loose[NOW] > LOOSE
 
 
 @inner
 def _apply(line: Line, tangents: np.ndarray, change: np.ndarray, c: CableNumbers, work: Load) -> None:
-    """Add the jumps to the velocities of level NOW, and forget what was before."""
+    """Add the jumps to the velocities of level NOW, and discard the levels before."""
     N, jump = line.ends.count, line.rows[RESIDUAL]
     for i in range(3):
         line.velocity[NOW, 0, i] += change[i]

@@ -30,7 +30,7 @@ SMOOTHING = 1e-13
 SOFTEST = 1e-4
 """T₀ that a difficult step starts with, a tenth at a time down to `SMOOTHING`. [N]"""
 KNOWN = 1e-4
-"""A cable with more tension than this is taut, and its tension is foreseen from the steps before. [N]"""
+"""A cable with more tension than this is taut, and its tension is extrapolated from the steps before. [N]"""
 FOLDING = 0.3
 """How early a heaped segment loses its direction, see `chord_length`; without any effect on a taut one."""
 

@@ -87,7 +87,7 @@ class Solved(Record):
 
 
 class Tow(Record):
-    """The force on the vehicle, and how it answers to the place of the tow point.
+    """The force on the vehicle, and its derivatives by the place of the tow point.
 
     Attributes:
         force: at level NEW (3,). [N]
@@ -124,7 +124,7 @@ class Ends(Record):
         drum_velocity: of the drum at level NEW (3,). [m/s]
         time: of level NOW. [s]
         previous_step: t_now − t_before, 0 after a start. [s]
-        layout: how the cable is divided, and what its far end is.
+        layout: how the cable is divided, and the kind of its far end.
         tow: the force on the vehicle.
         solver: how a step is solved.
         solved: how the last step that was tried was solved.
@@ -270,7 +270,7 @@ def in_water(line: Line) -> float:
 
 @inlined
 def paid_out(line: Line) -> float:
-    """Return the length that has left the drum by level NOW, with what lies loose before it. [m]."""
+    """Return the length that has left the drum by level NOW, with the loose cable in front of it. [m]."""
     return in_water(line) + line.ends.loose[NOW]
 
 

@@ -1,6 +1,6 @@
 """The compiled loop of a cable whose tow point moves on a given path; steps that fail or err are retried smaller.
 
-`pull_out` and `tow` lay a cable out, let it follow a sampled path, and hand back its history.
+`pull_out` and `tow` lay a cable out, move it along a sampled path, and return its history.
 
 Where an error is allowed (`rtol`), it is estimated, and the next step is the one that would just be allowed. A
 backward difference of second order errs by h(h + h')/6 x‴ in the velocity V, that is by h(h + h')/6 V̈. The tow force
@@ -59,7 +59,7 @@ estimate."""
 
 
 class Record(NamedTuple):
-    """What a run keeps, one row per step; shapes are packed one behind another.
+    """The results of a run, one row per step; shapes are packed one after another.
 
     Attributes:
         tow_force: force on the vehicle, earth axes (n, 3). [N]
@@ -120,7 +120,7 @@ def follow_path(
     Args:
         line: the cable at path.times[0]; changed.
         path: how the tow point moves.
-        led: how the drum moves, and what its winch is asked for, see `cable.drum_motion`.
+        led: motion of the drum, and setpoint of its winch, see `cable.drum_motion`.
         water: how the water moves.
         c: cable.
         drum: drum or winch.
@@ -203,7 +203,7 @@ def _cover(
 
 @compiled
 def write_row(line: Line, record: Record, k: int, used: int, c: CableNumbers) -> None:
-    """Write row k of a record, with the shape of level NOW behind the `used` nodes that are there already."""
+    """Write row k of a record, with the shape of level NOW after the `used` nodes that are there already."""
     N = line.ends.count
     record.tow_tension[k], record.drum_tension[k] = end_tensions(line)
     record.length[k] = paid_out(line)

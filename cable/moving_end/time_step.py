@@ -1,11 +1,11 @@
-"""Solve one step: guess it, and let Newton's method make the guess right.
+"""Solve one step: predict it, and correct the prediction by Newton's method.
 
 `try_step` solves for a new tow-point position without forgetting where the cable was, so a vehicle and its cable
 can ask "what if" until they agree; `remeshing.accept` then makes the answer the present state.
 
 What the drum does in the step (turn, stand, spin ahead of the cable) is guessed from the step before, and changed
 when the answer contradicts it (`cable.drum`). Newton's method is damped, bounded in iterations, and always has an
-outcome. From its last matrix follows how the tow force, and all the cable, answers to the tow point.
+outcome. Its last matrix gives the response of the tow force, and of all the cable, to the tow point.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ def try_step(
         c: cable.
         drum: drum, with its place and velocity at the new time.
         work: work space.
-        again: level NEW holds the answer to another tow point, close by.
+        again: level NEW holds the solution for another tow point, close by.
     """
     failed, converged = 0, False
     # The solution may show that the drum is in another state than assumed: solve again in that state.
@@ -110,7 +110,7 @@ def try_step(
 
 @inlined
 def _takes_up(line: Line, drum: DrumNumbers) -> bool:
-    """Say whether a free drum would have taken up cable."""
+    """Return whether a free drum would have taken up cable."""
     taken_up = line.ends.last_length[NOW] - line.ends.last_length[NEW] > TAKEN_UP
     return taken_up and drum.control == FREE and not line.ends.layout.free_end
 
@@ -319,7 +319,7 @@ def _solved(line: Line, iterations: int, size: float) -> bool:
 
 @compiled
 def _failed(line: Line, rounding: float) -> bool:
-    """Note that it did not converge, and where the worst equation stands."""
+    """Report that it did not converge, and the place of the worst equation."""
     strain, allowed = _tolerances(line, rounding)
     worst, node, equation = 0.0, 0, 0
     for j in range(1, line.ends.count + 1):
@@ -368,7 +368,7 @@ def impedance(line: Line, Z: np.ndarray) -> None:
 
 @compiled
 def _relax(line: Line, gap: np.ndarray) -> None:
-    """Move all of level NEW as the last matrix has it answer to a tow point that is moved by `gap` (3,). [m]."""
+    """Move all of level NEW by the response of the last matrix to a displacement `gap` (3,) of the tow point. [m]."""
     step, L = line.rows[RESIDUAL], line.blocks[LOWER]
     for j in range(1, line.ends.count + 1):
         for m in range(SIZE):
@@ -385,7 +385,7 @@ def _relax(line: Line, gap: np.ndarray) -> None:
 def follow_tow(line: Line, tow: np.ndarray) -> bool:
     """Move the tow point of the answer on level NEW, and all that moves with it by the factors of the last matrix.
 
-    False, and nothing has moved, if there are none.
+    Return False, and move nothing, if there are none.
     """
     if not line.ends.solver.factored:
         return False

@@ -47,7 +47,7 @@ ROOM = 32.0
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Along:
-    """A run, and how it answers to small deviations; from `linearise_along`.
+    """A run, and its response to small deviations; from `linearise_along`.
 
     Attributes:
         time: of the run, one cable step apart (n + 1,). [s]

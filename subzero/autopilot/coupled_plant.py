@@ -156,7 +156,7 @@ class Tethered:
         return np.concatenate([hull, hidden, self._memory.read()])
 
     def events(self, x: np.ndarray) -> tuple[float, float]:
-        """Return what changes at once in a cable: the number of its segments, and what its drum does."""
+        """Return the discrete state of a cable: the number of its segments, and the state of its drum."""
         flat, places = x[HULL_SIZE:], self._memory.places
         return float(flat[places["count"]][0]), float(flat[places["drum_mode"]][0])
 
@@ -198,7 +198,7 @@ class Memory:
         self.size = int(ends[-1])
 
     def read(self) -> np.ndarray:
-        """Return the numbers as they stand (size,)."""
+        """Return the numbers, packed (size,)."""
         return np.concatenate([view.ravel().astype(float) for view in self._views.values()])
 
     def write(self, flat: np.ndarray) -> None:

@@ -184,7 +184,7 @@ def design_gains(
 
 
 def _check_part(part: control.StateSpace) -> None:
-    """Refuse a model that the recipe does not hold for."""
+    """Raise an error for a model that the recipe does not hold for."""
     import control
 
     allowed = "Allowed: a continuous control.StateSpace with one input and no feedthrough, of finite numbers."
@@ -207,7 +207,7 @@ def _check_part(part: control.StateSpace) -> None:
 def _check_weights(
     labels: tuple[str, ...], tracked: str, largest: Mapping[str, float], largest_command: float
 ) -> None:
-    """Refuse weights that mean nothing."""
+    """Raise an error for weights that are not valid."""
     allowed = (*labels, INTEGRAL)
     for name in (tracked, *largest):
         if name not in allowed:
@@ -308,7 +308,7 @@ def with_weights(name: str, **changes: float | Mapping[str, float]) -> dict[str,
 
 
 def checked(weights: dict[str, Weights]) -> dict[str, Weights]:
-    """Return weights, or refuse what they are not."""
+    """Return weights; raise an error if they are not valid."""
     for name, value in weights.items():
         if name not in WEIGHTS:
             raise UserError(

@@ -165,7 +165,7 @@ class EstimatorLoop:
         return -float(np.dot(k, off)), self.sample_time * k_integral * error
 
     def _jump(self, wanted: float, speed: float, rate: float) -> float:
-        """Return what a jump of the set-point takes off the integral, as in `loops`."""
+        """Return the change of the integral at a jump of the set-point, as in `loops`."""
         assert self.estimate is not None
         before = wanted if self._wanted is None else self._wanted + rate * self.sample_time
         self._wanted = wanted

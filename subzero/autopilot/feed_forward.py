@@ -132,7 +132,7 @@ class CableModel(ABC):
 
 
 def _refuse_unknown_length(reading: Observation) -> None:
-    """Refuse a cable length that no sensor measures: feed-forward would silently be 0."""
+    """Raise an error if no sensor measures the cable length: feed-forward would silently be 0."""
     if reading.cable_length != reading.cable_length:
         raise UserError(
             f"at t = {reading.time:g} s no sensor measures the cable's length (cable_length), which feed-forward needs."

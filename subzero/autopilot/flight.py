@@ -160,7 +160,7 @@ def _command(autopilot: Autopilot, reading: Observation, goal: Wanted) -> Sequen
 
 
 def _check(autopilot: Autopilot) -> None:
-    """Refuse what cannot fly."""
+    """Raise an error for an autopilot that cannot fly."""
     missing = [name for name in ("name", "sample_time", "reset", "update") if not hasattr(autopilot, name)]
     if missing:
         raise UserError(

@@ -121,7 +121,9 @@ def cable_states() -> list[str]:
 
 
 def _check_straight(model: Model, steady: Trim) -> None:
-    """Refuse a cable that does not lie straight behind the vehicle, from a drum that turns as it is pulled."""
+    """Raise an error for a cable that does not lie straight behind the vehicle, or a drum that does not turn
+    freely.
+    """
     cable = model.cable
     angle = (abs(cable.weight_in_water) / max(cable.normal_drag, 1e-12)) ** 0.5 / steady.speed
     wrong = (
@@ -274,7 +276,7 @@ class Mode(NamedTuple):
 
 
 INTEGRATOR = 1e-6
-"""A pole nearer to zero than this times U/L is an integrator: differences do not know it better."""
+"""A pole nearer to zero than this times U/L is an integrator: differences are not more accurate."""
 
 
 def modes(system: control.StateSpace, steady: Trim) -> list[Mode]:

@@ -112,7 +112,7 @@ def make(
 
     Args:
         name: one of `AUTOPILOTS`, or the path of a Python file with one (`from_file`).
-        trial: what it will fly.
+        trial: the trial to fly.
         feed_forward: one of `FEED_FORWARD`.
         sample_time: of the controller. [s]
         tuning: gains; those of `tune` on the trial's vehicle by default.

@@ -53,7 +53,7 @@ class Sensor:
     drop_out: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a sensor."""
+        """Raise an error if the fields do not describe a possible sensor."""
         allowed = Observation._fields[1:]
         if not isinstance(self.channel, str) or self.channel not in allowed:
             raise UserError(

@@ -138,7 +138,7 @@ def sampled_loop(
 
 
 def check_stable(tuning: Tuning, sample_time: float, estimates: Estimates | None = None) -> None:
-    """Refuse gains with which the sampled bare hull is unstable.
+    """Raise an error for gains with which the sampled bare hull is unstable.
 
     Args:
         tuning: the gains.

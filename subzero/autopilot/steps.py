@@ -50,7 +50,7 @@ STEPS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Pilot:
-    """Who flies a step, with what knowledge.
+    """The autopilot that flies a step, and its model of the plant.
 
     Attributes:
         autopilot: one of `AUTOPILOTS`, or the path of a Python file with one.
@@ -96,7 +96,7 @@ def step(
     Args:
         name: one of `STEPS`.
         scenario: whose vehicle, cable and start; its commands are not used.
-        pilot: who flies; a PID autopilot that knows nothing of the cable by default.
+        pilot: the autopilot; by default a PID autopilot without a model of the cable.
         size: of the step, in degrees, m or m/s; the table's by default.
         speed: to hold. [m/s]
         tethered: with the cable.

@@ -53,7 +53,7 @@ def calibrate(
         scenario: the trial of every record whose sidecar does not name one.
         free: dotted names of the numbers to estimate, such as "rudder.lift_slope" or "cable.normal_drag_coefficient";
             if empty, the twelve that records usually determine.
-        vehicle: name or file of the vehicle to begin with, in the place of those of the trials.
+        vehicle: name or file of the vehicle to begin with, instead of those of the trials.
         commands: "record" or "scenario", if a record's commands may differ from the scenario's.
         progress: called with the fraction that is done, and the task in progress.
         quick: the fit and its intervals only, without profiles and advice.
@@ -98,7 +98,7 @@ def _with_vehicle(found: Logged, vehicle: str | Path) -> Logged:
 
 
 def _check(logged: Sequence[Logged]) -> None:
-    """Refuse records that no number of one vehicle can be estimated from."""
+    """Raise an error for records that no number of one vehicle can be estimated from."""
     if not logged:
         raise UserError(NO_RECORD)
     first = logged[0]

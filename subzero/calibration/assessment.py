@@ -251,7 +251,7 @@ STRANGE_NOISE = 3.0
 
 
 def strange(work: Fitted) -> tuple[str, ...]:
-    """Say in sentences which sensors are many times as noisy as usual."""
+    """Return in sentences which sensors are many times as noisy as usual."""
     found = []
     for record in work.problem.records:
         for name, noise in record.noise.items():

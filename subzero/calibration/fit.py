@@ -1,4 +1,4 @@
-"""The most probable numbers, the noise behind them, and the covariance of both together.
+"""The most probable numbers, the noise estimated with them, and the covariance of both together.
 
     M = P⁻¹,  P = D⁻¹ + Jᵀ J;        honest:  M' = P⁻¹ (D⁻¹ + Jᵀ Ω J) P⁻¹,   Ω = cov(r)
 
@@ -39,7 +39,7 @@ from subzero.diagnosis.inference import (
 )
 
 HORIZONS = ((0.3, 0.6, 1.0), (0.1, 0.2, 0.35, 0.6, 1.0))
-"""Shares of the records that are fitted, one behind the other; of the first start, and of the second. [-]"""
+"""Shares of the records that are fitted, one after the other; of the first start, and of the second. [-]"""
 MORE_STARTS, START_SHARE = 4, 0.3
 """Starts with other numbers, up to this share of each, where those did not end in the same minimum. [-]"""
 SAME_MINIMUM = 10.0
@@ -66,7 +66,7 @@ LEAST_SHARE, FRESH_SHARE = 0.05, 0.5
 """A step that gains less than the first share of the predicted gain is not taken; after one that gains less than the
 second, sensitivities are computed again. [-]"""
 FIRST_DAMPING, LEAST_DAMPING = 1.0, 0.1
-"""Damping of a step that failed, in inverse prior variances, and that which is none any more. [-]"""
+"""Damping of a step that failed, in inverse prior variances, and the damping that counts as zero. [-]"""
 OWN_WITHIN = 0.3
 """Sensitivities will do for a first fit if they were made so close to it, in tolerances."""
 MAX_NOISE_ROUNDS = 2
@@ -78,7 +78,7 @@ class Fitted:
     """The fit of a calibration.
 
     Attributes:
-        problem: with the noise that was estimated behind the fit.
+        problem: with the noise that was estimated with the fit.
         fit: the most probable deviations.
         M: their covariance (k, k), inflated.
         settled: no step would move a calibrated number (`is_settled`), nor did one from the ends of an interval.

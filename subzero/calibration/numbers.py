@@ -40,7 +40,7 @@ USUAL = (
 is none of them: masses and forces that all scale together move nothing, and a vehicle can be weighed."""
 
 LEAST_PRIOR_SHARE = 0.4
-"""A prior is no narrower than this share of the number: ranges are what somebody thought plausible. [-]"""
+"""A prior is no narrower than this share of the number, since ranges are estimates of an author. [-]"""
 STEP_SHARE = 0.03
 """A number has moved if it has by this share of itself, or of its range if it is 0: the unit of fits and steps. [-]"""
 LOWEST_SHARE, HIGHEST_SHARE = -0.9, 5.0
@@ -181,7 +181,7 @@ def _moved(effect: Effect, setting: Setting) -> Setting:
 
 
 def _bounds(nominal: float, low: float, high: float) -> tuple[float, float]:
-    """Return the least and the greatest possible deviation: what has a sign keeps it."""
+    """Return the least and the greatest possible deviation: a number with a sign keeps it."""
     if nominal != 0.0:
         ends = (LOWEST_SHARE * nominal, HIGHEST_SHARE * nominal)
         return min(ends), max(ends)
@@ -212,7 +212,7 @@ def prior_variances(entries: Sequence[Entry], numbers: Sequence[Number]) -> np.n
 
 
 def _touches(effect: Effect, setting: Setting, names: Sequence[str]) -> bool:
-    """Say whether an effect moves one of some numbers."""
+    """Return whether an effect moves one of some numbers."""
     before, after = (
         [number_of(name, number) for name in names] for number in (setting, _moved(effect, setting))
     )

@@ -149,12 +149,12 @@ class Calibration:
         nuisances: parameter → (mean, standard deviation) in tolerances, of sensors, clock, current, cable and start.
         strange: sentences on what the calibrated vehicle leaves that is no noise; empty if all is.
         refused: sentences on why the fit is no calibration, the verdict "nothing_near"; empty if it is one.
-        curves: record → what was measured, and what the vehicle does before and after.
+        curves: record → the measurements, and the simulation before and after.
         records: what it was made of.
         files: name → text of the calibrated vehicle (and cable); empty where nothing came near.
         notes: what else to know.
         converged: the fit found a minimum.
-        seconds: what was done → how long it took. [s]
+        seconds: task → how long it took. [s]
     """
 
     estimates: tuple[Estimate, ...]

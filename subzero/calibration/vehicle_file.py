@@ -34,7 +34,7 @@ def text_of(before: str, estimates: Mapping[str, Estimate], provenance: Mapping[
 
     Args:
         before: the text of the file that it was.
-        estimates: dotted key of the file → what was estimated.
+        estimates: dotted key of the file → its estimate.
         provenance: key → text, or list of texts.
 
     Raises:
@@ -95,7 +95,9 @@ def _rounded(value: float) -> float:
 
 
 def _check(text: str, estimates: Mapping[str, Estimate]) -> None:
-    """Refuse a text that does not hold what it should: the file was not written one number a line."""
+    """Raise an error for a text that does not hold the expected numbers: the file was not written one number a
+    line.
+    """
     held = dict(leaves(tomllib.loads(text)))
     wrong = [
         key

@@ -62,7 +62,7 @@ class Outputs:
     animate: Literal["gif", "mp4"] | None = None
 
     def check(self) -> None:
-        """Refuse what cannot be made, before anything is simulated."""
+        """Raise an error for outputs that cannot be made, before anything is simulated."""
         from subzero.cli.write_results import check_pictures
 
         _refuse_no_export(self.export)
@@ -454,7 +454,9 @@ def _in_words(error: cyclopts.CycloptsError) -> str:
 
 
 def _unknown_option(error: cyclopts.UnknownOptionError) -> str:
-    """Say which option is most like one that is unknown, by their letters: all options have the dashes in common."""
+    """Return the option that is most like one that is unknown, by their letters: all options have the dashes in
+    common.
+    """
     word = (error.token.keyword or error.token.value).split("=")[0]
     options = {name.lstrip("-"): name for argument in error.argument_collection for name in argument.names}
     close = nearest(word.lstrip("-"), options, likeness=OPTION_LIKENESS)
@@ -462,7 +464,7 @@ def _unknown_option(error: cyclopts.UnknownOptionError) -> str:
 
 
 def _missing(command: str, argument: cyclopts.Argument) -> str:
-    """Say what a command needs, and how it is called."""
+    """Return what a command needs, and how it is called."""
     if not argument.required:
         return f"{argument.name} needs a value."
     return (
@@ -471,7 +473,7 @@ def _missing(command: str, argument: cyclopts.Argument) -> str:
 
 
 def _refuse_no_export(kinds: Sequence[str]) -> None:
-    """Refuse a kind of file that nothing here writes, before the run."""
+    """Raise an error for a kind of file that nothing here writes, before the run."""
     if kinds:
         from subzero.results.export import writer_of
 
@@ -480,7 +482,7 @@ def _refuse_no_export(kinds: Sequence[str]) -> None:
 
 
 def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Runs:
-    """Return runs that know how much they change with half the steps."""
+    """Return runs with their change at half the steps."""
     from subzero.simulation.comparison import refine
 
     marked = {}
@@ -491,7 +493,7 @@ def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Ru
 
 
 def _progress(trial: scenarios.Trial, words: str = "") -> ProgressBar:
-    """Return a progress bar that says what costs in this trial where it stands still."""
+    """Return a progress bar that reports the cost of this trial where it stands still."""
     from subzero.cli.progress import costs_of, progress_bar
 
     return progress_bar(words or f"Simulating {trial.name}", lambda: costs_of(trial))

@@ -61,7 +61,7 @@ class PilotOptions:
     seed: int = 0
 
     def of(self, label: str) -> Pilot:
-        """Return who flies with the cable or without it."""
+        """Return the autopilot that flies with the cable or without it."""
         from subzero.autopilot.sensors import ESTIMATED, PERFECT, Sensors
         from subzero.autopilot.steps import Pilot
 

@@ -91,7 +91,7 @@ def diagnose(
     search: Search = FULL_SEARCH,
     output_mode: OutputMode = PLAIN,
 ) -> int:
-    """Say what the simulation gets wrong in measured records, name the cause, extend the model and measure the gain.
+    """Find the errors of a simulation in measured records, name the cause, extend the model and measure the gain.
 
     Args:
         files: the scenario that was flown, a name (see "subzero list") or a TOML file; a record's sidecar may name it

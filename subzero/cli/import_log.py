@@ -102,7 +102,7 @@ def _targets(logs: list[Path], out: Path, map_out: Path | None, merge: bool) -> 
 def _written(
     found: list[Imported], targets: list[Path], folder: Path, map_out: Path | None
 ) -> dict[str, Any]:
-    """Write all records with their maps, or the map that was asked for, and return what was written."""
+    """Write all records with their maps, or the requested map, and return the files written."""
     from subzero.files.atomic_output import open_output_folder
     from subzero.files.read_file import MEGABYTE, MOST_OF_A_CSV
     from subzero.logs.api import to_csv
@@ -130,7 +130,7 @@ def _written(
 
 
 def _print(found: Imported) -> None:
-    """Print a line for each column, and what was done."""
+    """Print a line for each column, and the notes."""
     rows = [HEADINGS, *found.table()]
     widths = [max(len(printable(row[at])) for row in rows) for at in range(4)]
     print(f"{found.source}:")
@@ -142,7 +142,7 @@ def _print(found: Imported) -> None:
 
 
 def _as_json(found: Imported) -> dict[str, Any]:
-    """Return what was found, as plain values."""
+    """Return the findings, as plain values."""
     rows = [dict(zip(HEADINGS, row, strict=True)) for row in found.table()]
     notes = list(found.record.notes) if found.record else []
     return {"log": found.source, "columns": rows, "notes": notes, "questions": found.mapping.questions}

@@ -144,7 +144,7 @@ def _version(name: str) -> str:
 
 
 def _extras() -> Iterator[tuple[str, list[str]]]:
-    """Return each extra of ours that is not installed whole, and what it lacks."""
+    """Return each extra of ours that is not installed whole, and the packages that it lacks."""
     import re
     from importlib.metadata import requires
 
@@ -233,7 +233,7 @@ def _off(found: np.ndarray, exact: np.ndarray) -> float:
 
 
 def _print(about: dict[str, Any], checks: list[Check]) -> None:
-    """Print what was found."""
+    """Print the findings."""
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table

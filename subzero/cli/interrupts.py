@@ -81,7 +81,7 @@ def was_interrupted() -> bool:
 
 
 def set_exit_message(message: Callable[[], str]) -> None:
-    """Let an interrupted command say what it leaves, if that is more than the files of its end."""
+    """Set the message of an interrupted command, for one that leaves more than the files of its end."""
     _exit_message[:] = [message]
 
 

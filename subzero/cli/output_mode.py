@@ -68,10 +68,10 @@ _VOICE: ContextVar[OutputMode] = ContextVar("VOICE", default=PLAIN)
 
 
 def output_mode_of_command() -> OutputMode:
-    """Return how the command that is carried out was asked to speak."""
+    """Return the output mode of the command that is carried out."""
     return _VOICE.get()
 
 
 def set_output_mode(output_mode: OutputMode) -> None:
-    """Let the command that is carried out speak so."""
+    """Set the output mode of the command that is carried out."""
     _VOICE.set(output_mode)

@@ -164,12 +164,12 @@ _compilations = [0]
 
 
 def _compiling() -> bool:
-    """Say whether numba is at work."""
+    """Return whether numba is compiling."""
     return _compilations[0] > 0
 
 
 def _listen() -> None:
-    """Let numba say when it compiles, from now on."""
+    """Count the compilations of numba, from now on."""
     from numba.core import event
 
     class Count(event.Listener):  # type: ignore[misc]  # numba has no types

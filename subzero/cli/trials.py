@@ -147,7 +147,7 @@ def _toml(path: Path) -> tuple[str, str]:
 
 
 def _check_vehicle(found: Contents) -> None:
-    """Refuse a vehicle that its own equations refuse."""
+    """Raise an error for a vehicle that its own equations refuse."""
     from scenarios.parts import nested
     from vehicle import from_mapping
 

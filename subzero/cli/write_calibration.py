@@ -120,7 +120,7 @@ def _mark(estimate: Estimate) -> str:
 
 
 def headline(found: Calibration) -> str:
-    """Return what was gained, in one sentence; or that nothing was."""
+    """Return the gain in one sentence; or that there was none."""
     if found.refused:
         return "Nothing comes near these records: the numbers above are no calibration, and no vehicle is written."
     count, moved = len(found.estimates), sum(estimate.is_determined for estimate in found.estimates)
@@ -148,7 +148,7 @@ def story(found: Calibration) -> Iterator[str]:
 
 
 def advised(advice: Advice) -> str:
-    """Return a trial to fly, and what it would make sharper."""
+    """Return a trial to fly, and the numbers that it would make sharper."""
     sharper = [(name, factor) for name, factor in advice.sharper.items() if factor >= WORTH_FLYING][
         :MOST_TOLD
     ]

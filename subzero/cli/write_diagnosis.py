@@ -78,7 +78,7 @@ def print_plan(rows: Sequence[Detectability], console: Console | None = None) ->
 
 
 def _print_unreported(verdict: Verdict, console: Console) -> None:
-    """Print which causes these records cannot show, or not tell apart, behind what they do show."""
+    """Print which causes these records cannot show, or not distinguish, after those that they do show."""
     hidden = tables.detectable(verdict)
     if not hidden.rows:
         return
@@ -277,7 +277,7 @@ def about(logged: Sequence[Logged]) -> dict[str, str]:
 
 
 def _outcome(verdict: Verdict, logged: Sequence[Logged]) -> list[Line]:
-    """Return the verdict, and what it is about."""
+    """Return the verdict, and the trial and records it is about."""
     kind: Any = "good" if verdict.verdict in (NOTHING_WRONG, CAUSE_NAMED) and verdict.complete else "bad"
     records = [
         Line(text=f"{trial.name}: {trial.record.time.size} samples, {len(trial.record.values)} channels")

@@ -43,7 +43,7 @@ FILES = (RESULT, TABLE, "summary.json", "report.html", *(f"{name}.png" for name 
 SHOWN_REASONS = 5
 """Number of failed members that are reported with their reason. [-]"""
 KEPT_REASONS = 100
-"""So many stand in the summary; the table has all."""
+"""Number of failed members in the summary; the table has all."""
 
 
 def write_sweep(
@@ -104,7 +104,7 @@ def pictures(shown: Shown, pool: WorkerPool | None = None) -> dict[str, Picture]
         for name, each in asked.items():
             try:
                 made |= each.result()
-            except BrokenExecutor:  # somebody killed it: no member is lost by that, and no figure
+            except BrokenExecutor:  # a user killed it: no member is lost by that, and no figure
                 made |= drawn_here(shown, [name])
     return {name: made[name] for name in FIGURES if name in made}
 

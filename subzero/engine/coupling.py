@@ -119,7 +119,7 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> int:
 
 @compiled
 def forget(setup: Setup, live: Live) -> None:
-    """Forget what only makes guesses better: where a state is set anew, it is of another one."""
+    """Discard all that only improves guesses: where a state is set again, it belongs to another one."""
     for i in range(3):
         live.now.missed[i] = 0.0
     _mobility(setup.fixed.r_c, setup.fixed.vehicle.inverse_mass, live.now.mobility)
@@ -154,7 +154,7 @@ def _move(setup: Setup, live: Live, start: float, span: float) -> bool:
 
 @compiled
 def _forces_agree(now: Now, F: np.ndarray, agreement: float) -> bool:
-    """Say whether the cable answers with the force that the hull was pulled by, as far as rounding lets one say."""
+    """Return whether the cable responds with the force that the hull was pulled by, as far as rounding allows."""
     size, gap, stiffness, reach = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         size = max(size, abs(F[i]))

@@ -117,7 +117,9 @@ def prepare(
 
 
 def _needed_last(setup: Setup, live: Live) -> list[Call]:
-    """Return what a run calls last, in its order, and for which arguments: half of what it compiles."""
+    """Return the last functions that a run calls, in its order, and their arguments: half of the code that it
+    compiles.
+    """
     kind, now = numba.typeof, numba.typeof(live.now)
     line, work, c, drum = (kind(each) for each in (live.line, live.load, setup.fixed.cable, setup.fixed.drum))
     step, vector, row = numba.float64, numba.float64[::1], numba.int64
@@ -151,7 +153,7 @@ def _new_now() -> Now:
 
 
 def _can_run_in(fixed: Fixed) -> bool:
-    """Say whether a cable may begin with short segments: one on a free drum, that is held there or weighs nothing.
+    """Return whether a cable may begin with short segments: one on a free drum, that is held there or weighs nothing.
 
     Else its direction at the drum is open (all waves leave), and short segments would follow whatever comes.
     """
@@ -310,7 +312,7 @@ def first_state(trial: scenarios.Trial, model: Model, tethered: bool) -> np.ndar
 
 
 def _check_fins(start: scenarios.Start, model: Model) -> None:
-    """Refuse fins beyond what their servos reach."""
+    """Raise an error for fins beyond the range of their servos."""
     for fin, angle in zip(FINS, start.fins, strict=True):
         most = getattr(model.vehicle, f"{fin}_servo").deflection_limit
         if abs(angle) > most * (1.0 + 1e-12):

@@ -1,4 +1,4 @@
-"""What a run keeps: one row per time of the run, or per so many, shapes packed one behind another.
+"""The results of a run: one row per time of the run, or per so many, shapes packed one after another.
 
 Every time writes its row. Where only every so many are kept (`stride`), the next one writes over it: so the rows that
 are kept are the same to the last bit as without, and the last one is where the run ended.
@@ -109,11 +109,11 @@ class Grid(NamedTuple):
 
 
 class RunState(NamedTuple):
-    """Where a run stands between two calls of `subzero.engine.time_loop.run_rows`.
+    """The position of a run between two calls of `subzero.engine.time_loop.run_rows`.
 
     Attributes:
         setup, live, recording: the run.
-        behind: how many of its times are behind.
+        behind: how many of its times are done.
         used: nodes of the recording in use, in rows that are kept.
         ending: how the last call ended.
     """
@@ -264,7 +264,7 @@ def thinned(run: Run, stride: int) -> Run:
 def run_so_far(
     grid: Grid, recording: Recording, behind: int, used: int, message: str, *, completed: bool
 ) -> Run:
-    """Return a run of which so many times are behind, with `used` nodes in the rows that are kept for good."""
+    """Return a run with so many times done, and `used` nodes in the rows that are kept for good."""
     times, last = grid.times[:behind], row_of(behind - 1, grid.stride)
     if (behind - 1) % grid.stride:
         used += int(recording.nodes[last])

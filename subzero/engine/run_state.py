@@ -26,7 +26,7 @@ TIME, SPEED, PITCH, HEADING = range(4)
 
 LINEAR_ROWS = 4
 PLACE, SLOPE, KNOT_ROWS = 1, 7, 13
-"""Rows of a smooth one (13, n), behind that of time: x, y, z [m], φ, θ, ψ [rad], and how fast each of them changes."""
+"""Rows of a smooth one (13, n), after that of time: x, y, z [m], φ, θ, ψ [rad], and the rate of each of them."""
 
 
 class HullWork(Record):

@@ -72,7 +72,7 @@ def _reach(
 ) -> int:
     """Go from times[at − 1] to times[at]; return how that ended.
 
-    Arrays cannot grow in here: stop before they are full, and let Python enlarge them and call again.
+    Arrays cannot grow in here: stop before they are full, so that Python can enlarge them and call again.
     """
     nodes = live.line.ends.count + 1 + SPARE * parts
     if nodes > live.line.length.size or used + live.line.length.size > recording.tension.size:
@@ -98,7 +98,7 @@ class _HandleType(types.StructRef):
 
 
 class _Reference(structref.StructRefProxy):
-    """A run as one pointer; the arrays must be kept alive by whoever made it."""
+    """A run as one pointer; the caller that made it must keep the arrays alive."""
 
 
 class _Interpreted(NamedTuple):
@@ -116,7 +116,7 @@ Handle: Any = _Interpreted if numba.config.DISABLE_JIT else _Reference
 
 
 ROW, USED, ENDING = range(3)
-"""Where a held run stands (3,): the present row, nodes of the recording in use, and how the last step ended.
+"""The position of a held run (3,): the present row, nodes of the recording in use, and how the last step ended.
 
 Compiled code writes it, so that it is true whenever Python code runs, an interrupt's handler among it.
 """

@@ -1,8 +1,8 @@
 """What would a trial do if …? Sliders for its main numbers, the run of what they say, and the file of it.
 
-Nothing here knows a page: `subzero.explore.page` shows it. A slider is a value: which numbers of the trial it moves
-(`scenarios.parameters` has their names), its unit, and from where to where it goes. A run of a change is that of
-`Trial.with_changes`, and so is the file: read again, it is the same trial, to the last bit.
+The module is independent of the page: `subzero.explore.page` shows it. A slider is a value: which numbers of the
+trial it moves (`scenarios.parameters` has their names), its unit, and from where to where it goes. A run of a change
+is that of `Trial.with_changes`, and so is the file: read again, it is the same trial, to the last bit.
 """
 
 from __future__ import annotations
@@ -150,7 +150,7 @@ def sliders_of(trial: Trial) -> tuple[Slider, ...]:
 
 
 def _is_in_file(trial: Trial, name: str) -> bool:
-    """Say whether a number may stand in the file of a trial: not what a CSV file or a prescribed motion says."""
+    """Return whether a number may stand in the file of a trial: not what a CSV file or a prescribed motion says."""
     section, _, key = name.partition(".")
     if section == "start" and trial.motion is not None:
         return key in LEFT_OPEN and not (key == "depth_m" and trial.motion.depth is not None)
@@ -256,7 +256,7 @@ class Exploration:
         }
 
     def answer(self, values: Values, progress: Progress = lambda fraction: None) -> Answer:
-        """Return the run of some positions of the sliders, or why there is none.
+        """Return the run of some positions of the sliders, or the reasons why there is none.
 
         Args:
             values: the positions.

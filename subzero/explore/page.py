@@ -62,7 +62,7 @@ TITLES = {
 
 @contextmanager
 def address(port: int) -> Iterator[tuple[Access, socket.socket]]:
-    """Give who may reach a page, with its address, and the socket that listens there, before anything is simulated.
+    """Yield the access rules of a page, with its address and the socket that listens there, before any simulation.
 
     Raises:
         UserError: what the page needs is not installed; the port cannot be had.
@@ -384,7 +384,9 @@ class Tab:
 
 
 def _check_name(name: str) -> None:
-    """Refuse the name of a file that leads out of the working folder, or that a terminal or a command would obey."""
+    """Raise an error for a file name that leads out of the working folder, or that a terminal or a command would
+    obey.
+    """
     if set(name) & {"/", "\\"}:
         raise UserError(f"Give a name without folders: the file goes to {printable(str(Path.cwd()))}.")
     if not name.isprintable() or name.startswith("-"):
@@ -409,7 +411,7 @@ def _take(take: Callable[..., None], sender: str, *message: Any) -> None:
     """Take what a browser sends, unless it is no event at all."""
     with suppress(
         ValueError, TypeError, LookupError, AttributeError
-    ):  # errors in what it causes are caught inside
+    ):  # errors in its effects are caught inside
         take(sender, *message)
 
 
@@ -455,7 +457,8 @@ class Knob:
                     format=f"%.{DIGITS}g",
                     on_change=lambda event: self.turn(event.value),
                 )
-                self.number.on("blur", lambda: self.put(self._value))  # what was left empty is as it was
+                # An empty field gets the last value again.
+                self.number.on("blur", lambda: self.put(self._value))
                 self.number.props(
                     f'dense debounce=300 input-class=text-right aria-label="{slider.words}{unit}"'
                 )
@@ -480,8 +483,8 @@ class Knob:
         self._moved(self.slider.name, value)
 
     def put(self, value: float) -> None:
-        """Stand at a value; the handle of one beyond the slider's ends stands at its end."""
-        self._value, self._is_put = value, True  # neither of the two has been moved by somebody
+        """Set the position; the handle of a value beyond the slider's ends is at its end."""
+        self._value, self._is_put = value, True  # set by the program, not moved by the user
         self.number.set_value(value)
         self.handle.set_value(min(max(value, self.slider.low), self.slider.high))
         self._is_put = False

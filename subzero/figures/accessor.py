@@ -105,7 +105,7 @@ def _loaded(path: Path) -> xr.Dataset:
 
 
 def _check_layout(file: Any, name: str) -> None:
-    """Refuse a file without a run, and arrays that are not those of a run."""
+    """Raise an error for a file without a run, and for arrays that are not those of a run."""
     missing = [variable for variable in NEEDED if variable not in file.variables]
     if missing or "scenario" not in file.ncattrs():
         raise UserError(
@@ -123,7 +123,7 @@ def _check_layout(file: Any, name: str) -> None:
 
 
 def _check_values(run: xr.Dataset) -> None:
-    """Refuse times that are none and attributes of another kind; raise whatever reading them raises."""
+    """Raise an error for invalid times and attributes of another kind; errors of reading them are passed on."""
     times = run["time"].values
     if not (times.size and np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
         raise DamagedError("its times do not rise")

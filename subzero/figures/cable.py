@@ -1,4 +1,4 @@
-"""The cable: where it lies, how it pulls along its length, and what it does to the vehicle.
+"""The cable: its shape, its tension along its length, and its force on the vehicle.
 
 `tension` shows the pull along the whole cable at all times, and between which values it has been (a range graph).
 `deployment` shows what a winch does, or a vessel that carries the drum: cable and distance, pay-out, tension, tracks.
@@ -161,7 +161,7 @@ def drum_direction(run: xr.Dataset) -> np.ndarray:
 
 
 def axes_of(run: xr.Dataset) -> tuple[str, str, str]:
-    """Return what the earth axes are called: counted from a drum that stands, or from where a vessel started."""
+    """Return the labels of the earth axes: counted from a drum that is at rest, or from the start of a vessel."""
     return MOVING if np.ptp(drum_direction(run), axis=0).max() > RESTING else AXES
 
 
@@ -239,7 +239,7 @@ MARKS = 60.0
 
 
 def is_deployed(run: xr.Dataset) -> bool:
-    """Say whether a winch turns the drum or a vessel carries it."""
+    """Return whether a winch turns the drum or a vessel carries it."""
     reported = json.loads(run.attrs["parameters"])
     return any(reported.get(name) for name in ("winch", "vessel"))
 

@@ -242,7 +242,7 @@ def _verdict_colour(discrimination: float) -> str:
 
 
 BAR_ROW, NARROW_LEFT = 0.17, 0.6
-"""Height of a bar with its space [inch]; where bars begin in a narrow figure, whose panels stand below one another."""
+"""Height of a bar with its space [inch]; start of bars in a narrow figure, whose panels are below one another."""
 
 
 def _bars(
@@ -282,7 +282,7 @@ MODELS: dict[str, dict[str, Any]] = {
     "nominal": {"color": style.ORANGE, "linestyle": style.DASHES[1], "linewidth": 1.3},
     "extended": {"color": style.BLUE, "linestyle": style.DASHES[0], "linewidth": 1.4},
 }
-"""Models that are drawn over what was measured, the best one last."""
+"""Models that are drawn over the measurements, the best one last."""
 CALIBRATED = "tolerance"
 """The nominal model refitted within its tolerances, drawn where nothing is extended."""
 MODEL_WORDS = {
@@ -367,7 +367,7 @@ class Drawn(NamedTuple):
 
     @staticmethod
     def _key(model: str) -> str:
-        """Return the explanation that a model stands for, as in `Verdict.probabilities`."""
+        """Return the explanation that a model represents, as in `Verdict.probabilities`."""
         return model.removeprefix(RIVAL).replace(CALIBRATED, "none")
 
     @property
@@ -377,7 +377,7 @@ class Drawn(NamedTuple):
 
     @property
     def shown(self) -> dict[str, dict[str, Any]]:
-        """The models that are drawn over what was measured, and how."""
+        """The models that are drawn over the measurements, and their styles."""
         looks = {"nominal": MODELS["nominal"], self.best: MODELS["extended"]}
         return {name: look for name, look in looks.items() if name in self.curves.models}
 
@@ -393,7 +393,7 @@ class Drawn(NamedTuple):
 
 
 def misfit(drawn: Drawn, title: Title) -> Figure | None:
-    """Draw every channel: measured over models on the left, what they leave unexplained on the right."""
+    """Draw every channel: measured over models on the left, the residuals of the models on the right."""
     measured = drawn.curves.measured
     if not measured:
         return None
@@ -410,7 +410,7 @@ def misfit(drawn: Drawn, title: Title) -> Figure | None:
 
 
 def rivals(drawn: Drawn, title: Title) -> Figure | None:
-    """Draw what it would have looked like if a rival were true: what was measured would lie on the rival's line."""
+    """Draw the channels as if a rival were true: the measurements would then lie on the rival's line."""
     curves, best = drawn.curves, drawn.best
     names = [model for model in drawn.named if model in curves.models and model != best]
     if not names or not any(name.startswith(RIVAL) for name in (best, *names)):
@@ -501,14 +501,16 @@ def _residuals(axes: Axes, drawn: Drawn, channel: str) -> None:
 
 
 def _behind(noise: Misfit | None) -> str:
-    """Return what stands behind the residuals."""
+    """Return the words that explain the background of the residuals."""
     if noise is None:
         return ""
     return "; grey: noise, 95 %" + ("; dotted: step" if noise.resolution > 0.0 else "")
 
 
 def _show_noise(axes: Axes, drawn: Drawn, channel: str, noise: float, unit: str) -> None:
-    """Let the noise and what the best model leaves be seen, even where the nominal model is far off: then say so."""
+    """Limit the axis so that the noise and the residuals of the best model are visible; say so if the nominal one is
+    cut.
+    """
     best = np.abs(drawn.left(channel, drawn.best)) if drawn.best in drawn.curves.models else np.zeros(1)
     most = NOISE_SHARE * max(BAND * noise, float(best.max(initial=0.0)))
     nominal = drawn.curves.models.get("nominal")
@@ -548,7 +550,7 @@ def _smooth(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def _fit_to(axes: Axes, curves: list[np.ndarray]) -> None:
-    """Let outliers lie outside of the panel rather than flatten what matters."""
+    """Limit the axis so that outliers are outside of the panel and do not flatten the other values."""
     values = np.concatenate([curve[np.isfinite(curve)] for curve in curves])
     low, high = values.min(), values.max()
     margin = 0.08 * (high - low) or 1.0

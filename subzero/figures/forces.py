@@ -34,7 +34,7 @@ VISIBLE = 1e-3
 """What never reaches this share of the largest is not worth a line."""
 
 CABLE, CABLE_COLOUR = "cable", style.GREEN
-"""The cable has one colour: what it does to the vehicle, and what it costs."""
+"""The cable has one colour: for its force on the vehicle, and for its energy."""
 
 COMPONENTS = {
     "X": ("Forward force by term", "$X$ [N]"),

@@ -1,4 +1,4 @@
-"""How the vehicle moves: the four panels of Fig. 6, and what its actuators and its attitude do."""
+"""The motion of the vehicle: the four panels of Fig. 6, its actuators and its attitude."""
 
 from __future__ import annotations
 

@@ -209,7 +209,7 @@ def log_scale(axes: Axes) -> None:
 
 
 def headline(axes: Axes, text: str) -> None:
-    """Say in words what a panel shows, behind its letter."""
+    """Write the title of a panel after its letter."""
     letter = axes.get_title(loc="left")
     most_letters = LETTERS_PER_INCH * _inches(axes)[0]
     lines = (
@@ -243,7 +243,7 @@ def legend(axes: Axes, columns: int = 3, *, tight: bool = False, **where: Any) -
         axes: a panel with labelled curves.
         columns: at most; fewer where labels are long.
         tight: with smaller letters and shorter lines.
-        where: of matplotlib, in the place of all that.
+        where: of matplotlib, instead of all that.
     """
     size, handle = (TINY, 1.3) if tight else (SMALL, 2.0)
     if not where:
@@ -291,7 +291,7 @@ def _wide(label: str, size: float) -> float:
 
 
 def channel_panel(axes: Axes, runs: Runs, name: str, record: Record | None = None) -> None:
-    """Draw one channel of all runs over time, and what was measured of it."""
+    """Draw one channel of all runs over time, and its measurements."""
     channel = BY_NAME[name]
     for run_name, run in runs.items():
         axes.plot(run["time"].values, run[name].values, label=run_name, **LINES[run_name])
@@ -303,7 +303,7 @@ def channel_panel(axes: Axes, runs: Runs, name: str, record: Record | None = Non
 
 
 def in_time(axes: Axes, runs: Runs) -> None:
-    """Let the time axis be the simulated time, whatever was measured besides."""
+    """Limit the time axis to the simulated time, also if the record is longer."""
     end = max(float(run["time"].values[-1]) for run in runs.values())
     axes.set_xlim(0.0, end if end > 0.0 else 1.0)
 
@@ -319,7 +319,7 @@ def calm(axes: Axes, smallest: float = 1e-6) -> None:
 
 
 def time_label(panels: list[Axes], columns: int) -> None:
-    """Name the time axis below the lowest row only; in a narrow figure, panels stand below one another."""
+    """Label the time axis below the lowest row only; in a narrow figure, panels are below one another."""
     columns = columns if width() >= ONE_COLUMN else 1
     for axes in panels[-columns:]:
         axes.set_xlabel("time [s]", fontsize=NORMAL, labelpad=2)

@@ -85,7 +85,7 @@ def read_bytes(path: str | Path, most: int) -> bytes:
 
 
 def check_readable(path: str | Path) -> None:
-    """Refuse a file that cannot be read, for formats that a library opens itself.
+    """Raise an error for a file that cannot be read, for formats that a library opens itself.
 
     Raises:
         UnreadableFileError: as `read_text`; of any size.
@@ -131,7 +131,7 @@ def _first_bytes(path: Path, count: int) -> bytes | None:
 
 
 def _refuse_half_written(path: Path) -> None:
-    """Refuse a result whose folder holds files of two runs."""
+    """Raise an error for a result whose folder holds files of two runs."""
     if path.name in interrupted_files(path.parent):
         why = f"a command was killed while it wrote {printable(str(path.parent))}: its files are of two runs"
         remedy = (

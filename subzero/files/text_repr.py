@@ -20,7 +20,7 @@ from subzero.errors import printable
 MOST_LINES = 12
 """An overview has no more lines than this, its title among them."""
 MOST_LETTERS = 100
-"""A title or a cell is cut behind so many letters."""
+"""A title or a cell is cut after so many letters."""
 
 
 class Overview(NamedTuple):
@@ -39,7 +39,7 @@ class Overview(NamedTuple):
         return "\n".join([cut(self.title), *(f"  {line.rstrip()}" for line in lines)])
 
     def html(self) -> str:
-        """Return it as a table in which whatever stands in a title or a cell is text."""
+        """Return it as a table in which titles and cells are plain text."""
         rows = "".join(
             f"<tr><th style='text-align:left'>{escape(cut(name))}</th>"
             + "".join(f"<td style='text-align:left'>{escape(cut(cell))}</td>" for cell in cells)

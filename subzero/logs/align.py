@@ -105,7 +105,7 @@ def _on_grid(name: str, first: Record, second: Record, step: float) -> tuple[np.
 
 
 def _correlation(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return lags of the second behind the first [steps], the correlation there, and the points that overlap."""
+    """Return lags of the second after the first [steps], the correlation there, and the points that overlap."""
     n, m = (max(len(pair[k]) for pair in pairs) for k in (0, 1))
     lags = np.arange(-(m - 1), n)
     cov = np.zeros((3, lags.size))

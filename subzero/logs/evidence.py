@@ -141,7 +141,7 @@ def findings(columns: Mapping[str, Measured], time: np.ndarray) -> Findings:
 
 
 def tied(channel: str, columns: Mapping[str, Measured], time: np.ndarray) -> bool:
-    """Say whether a channel is as good as proportional to what others measure of its changes."""
+    """Return whether a channel is nearly proportional to the measure that other channels give of its changes."""
     return any(_slope(tie, columns, time) for tie in TIES if tie.left == channel)
 
 
@@ -153,7 +153,7 @@ def units_by_size(channel: str, values: np.ndarray) -> list[str]:
 
 
 def _is_possible(channel: str, name: str, known: np.ndarray, unit: Unit) -> bool:
-    """Say whether numbers in a unit lie where the channel can be."""
+    """Return whether numbers in a unit are in the possible range of the channel."""
     most, size = LIMITS.get(kind_of(channel), math.inf), np.abs(known).max(initial=0.0)
     if name == "ddmm.mmmm":  # degrees are shorter than that, but near the meridian
         is_long = size > most or channel == LONGITUDE
@@ -192,7 +192,9 @@ def _possible(columns: Mapping[str, Measured], variables: Mapping[str, str]) -> 
 
 
 def _counts_turns(column: Measured) -> bool:
-    """Say whether a column is a heading that its name has in radians or degrees, and that counts on over some turns."""
+    """Return whether a column is a heading that its name has in radians or degrees, and that counts on over some
+    turns.
+    """
     turn = {"rad": 2.0 * math.pi, "degree": 360.0}.get(column.unit, 0.0) * (column.channel == "heading")
     return bool(np.nanmax(np.abs(column.values)) <= MOST_TURNS * turn)
 

@@ -127,7 +127,7 @@ def _keys(where: str, entry: object, allowed: Mapping[str, Any]) -> list[str]:
 
 
 def _is(value: object, kinds: Any) -> bool:
-    """Say whether a value is of some kinds: a finite number, a truth value only where that is asked for."""
+    """Return whether a value is of some kinds: a finite number, a truth value only where that is asked for."""
     if isinstance(value, bool) or kinds is bool:
         return isinstance(value, bool) and kinds is bool
     return isinstance(value, kinds) and (isinstance(value, str | list | dict) or real(value) is not None)

@@ -92,7 +92,7 @@ class Map:
 
 
 def find_clock(table: Table) -> tuple[Clock, tuple[str, ...]]:
-    """Return how the times of a log are read, by names and forms of its columns, and what has to be asked.
+    """Return how the times of a log are read, by names and forms of its columns, and the questions to ask.
 
     Raises:
         UserError: there is no time.
@@ -126,7 +126,9 @@ def _is_time(table: Table, name: str) -> Named | None:
 
 
 def _are_fractions(table: Table, name: str, other: str) -> bool:
-    """Say whether the fractions of a clock in whole seconds stand in another column, as its name and numbers say."""
+    """Return whether the fractions of a clock in whole seconds stand in another column, as its name and numbers
+    say.
+    """
     both = [
         column.values[np.isfinite(column.values)] for column in (table.columns[name], table.columns[other])
     ]
@@ -188,7 +190,7 @@ def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> 
 
 
 def contradictions(mapping: Map, table: Table, rows: np.ndarray, time: np.ndarray) -> tuple[str, ...]:
-    """Return what the values say against a map that was given, in sentences; its word holds all the same."""
+    """Return how the values contradict a map that was given, in sentences; the map is used nevertheless."""
     lines = {line.channel: line for line in mapping.lines if line.channel}
     values = {channel: line.factor * table.columns[line.name].values[rows] for channel, line in lines.items()}
     columns = {channel: Measured(channel, values[channel], line.unit) for channel, line in lines.items()}
@@ -248,7 +250,7 @@ def _either(words: Sequence[str]) -> str:
 def _chosen(
     named: Mapping[str, Named], values: Mapping[str, np.ndarray], time: np.ndarray
 ) -> tuple[dict[str, str], list[str]]:
-    """Return why each column is chosen among those of its channel, or "not used: …"; and what has to be asked."""
+    """Return why each column is chosen among those of its channel, or "not used: …"; and the questions to ask."""
     ranks = {name: (found.channel in TARGETS, found.rank) for name, found in named.items()}
     by_target: dict[str, list[str]] = {}
     for name in sorted(named, key=lambda name: ranks[name]):
@@ -287,7 +289,7 @@ def _best_of(
 
 
 def _are_alike(first: np.ndarray, second: np.ndarray) -> bool:
-    """Say whether two columns change alike, by as much."""
+    """Return whether two columns change alike, by as much."""
     known = np.isfinite(first) & np.isfinite(second)
     if not known.any():
         return False

@@ -46,7 +46,7 @@ def kind_of(channel: str) -> str:
 
 
 def is_unit(text: str) -> bool:
-    """Say whether a text is a unit that is known."""
+    """Return whether a text is a known unit."""
     return any(_spelling(text) == spelling for _, spelling in SPELLINGS) or text in ("-", "1", "%")
 
 

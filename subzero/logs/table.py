@@ -47,7 +47,7 @@ class Column:
 
     @property
     def is_empty(self) -> bool:
-        """Say whether it holds no value."""
+        """Return whether it holds no value."""
         return not np.isfinite(self.values).any()
 
 

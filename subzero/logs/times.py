@@ -150,7 +150,7 @@ def unit_by_values(clock: np.ndarray) -> list[str]:
 
 
 def _counts_in_sixties(clock: np.ndarray) -> bool:
-    """Say whether numbers can be hours, minutes and seconds in two digits each."""
+    """Return whether numbers can be hours, minutes and seconds in two digits each."""
     return bool(np.all((clock % 100.0 < 60.0) & (clock % 10_000.0 < 6_000.0) & (clock < 240_000.0)))
 
 
@@ -174,7 +174,9 @@ def over_midnight(clock: np.ndarray) -> np.ndarray:
 
 
 def first_after_setting(time: np.ndarray) -> int:
-    """Return the first row behind the last step of more than a year: before it, the clock was not set. 0 if none is."""
+    """Return the first row after the last step of more than a year: before it, the clock was not set. 0 if none
+    is.
+    """
     return int(np.flatnonzero(np.diff(time, prepend=time[:1]) > YEAR)[-1:].sum())
 
 

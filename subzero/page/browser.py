@@ -66,7 +66,7 @@ def installed() -> tuple[str, str] | None:
 
 
 def check_film() -> None:
-    """Refuse to film where something that it takes is not installed, before anything is simulated.
+    """Raise an error if a package that is needed to film is not installed, before anything is simulated.
 
     Raises:
         UserError: says what to install.

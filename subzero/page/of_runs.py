@@ -34,7 +34,7 @@ def page_of_runs(
         summary: of `subzero.results.summary.summary_of`, perhaps with ``indices`` of each run.
         figures: by name.
         command: the line that makes them again.
-        record: what was measured.
+        record: the measured record.
         name: of the command, such as compare; by default the second word of its line.
     """
     first = next(iter(runs.values()))
@@ -56,7 +56,7 @@ def page_of_runs(
 
 
 def _can_be_replayed(run: xr.Dataset) -> bool:
-    """Say whether there is anything to replay: at least two samples, of a vehicle whose shape is known."""
+    """Return whether there is anything to replay: at least two samples, of a vehicle whose shape is known."""
     shape = json.loads(run.attrs["parameters"]).get("vehicle", {})
     return run.sizes["time"] > 1 and all(name in shape for name in HULL)
 
@@ -86,7 +86,7 @@ def _warnings(summary: dict[str, Any], labels: list[str]) -> dict[str, list[str]
 
 
 def _sections(tables: list[Table], figures: Mapping[str, Figure]) -> list[Section]:
-    """Return the numbers, each table a section of its own, and the figures behind them."""
+    """Return the numbers, each table a section of its own, and the figures after them."""
     numbers = [Section(title=table.title, tables=[table]) for table in tables]
     return [*numbers, Section(title="Figures", figures=figures)] if figures else numbers
 

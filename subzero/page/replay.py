@@ -1,4 +1,4 @@
-"""What the replay of a page needs of some runs: poses, channels and cable shapes, small enough to stand inside it.
+"""The data of the replay of some runs: poses, channels and cable shapes, small enough to be embedded in the page.
 
 A series of numbers x is stored as 16-bit integers c, little-endian, in base64,
 
@@ -37,7 +37,7 @@ MISSING, LOWEST, STEPS = -32768, 32767, 65534
 """The code for no number; the number added to a code; the steps between the lowest and the highest."""
 
 HULL = ("hull", "rudder", "stern_planes", "propeller", "tow_point")
-"""Sections of a vehicle's parameters that say what it looks like."""
+"""Sections of a vehicle's parameters that determine its appearance."""
 
 POSE = ("north", "east", "depth", "roll_angle", "pitch", "heading")
 ACTUATORS = ("propeller_speed", "rudder_angle", "stern_plane_port_angle", "stern_plane_starboard_angle")
@@ -71,8 +71,8 @@ def encode(actors: tuple[Actor, ...], record: Record | None = None) -> dict[str,
     """Return the data of a replay, ready for JSON.
 
     Args:
-        actors: who moves; the first one is followed.
-        record: what was measured, drawn as dots, and as a track if it has places.
+        actors: the vehicles that move; the first one is followed.
+        record: the measured record, drawn as dots, and as a track if it has places.
     """
     first = actors[0].run
     parameters = json.loads(first.attrs["parameters"])
@@ -110,7 +110,7 @@ def _actor(actor: Actor) -> dict[str, Any]:
 
 
 def _measured(record: Record) -> dict[str, Any]:
-    """Return what was measured, in the channels that the page knows."""
+    """Return the measurements, in the channels of the page."""
     kept = _spread(record.time.size, MOST_SAMPLES)
     values = {name: pack(values[kept]) for name, values in record.values.items() if name in BY_NAME}
     return {"time": pack_exactly(record.time[kept]), "channels": values}

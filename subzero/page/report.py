@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MODULES = ("vectors", "data", "meshes", "shaders", "scene", "camera", "plan", "plots", "player")
-"""The modules of the player, each behind those that it imports."""
+"""The modules of the player, each after those that it imports."""
 
 FIGURES = {
     "fig4": "Tension of a straight pull, computed and exact",

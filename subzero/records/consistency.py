@@ -235,7 +235,7 @@ def trial_with_commands(trial: scenarios.Trial, record: Record, use: str | None)
 
 
 def _agree(trial: scenarios.Trial, record: Record, names: list[str]) -> None:
-    """Refuse commands that differ, and say from when on."""
+    """Raise an error for commands that differ, with the time of the first difference."""
     assert trial.commands is not None
     step = float(np.median(np.diff(record.time))) if record.time.size > 1 else 0.0
     for name in names:
@@ -274,7 +274,7 @@ def _with_recorded_commands(record: Record, names: list[str], trial: scenarios.T
 
 
 def _column(record: Record, name: str, at: int, others: scenarios.Commands | None) -> np.ndarray:
-    """Return a command at the record's times, in inner units; a gap holds what was before it."""
+    """Return a command at the record's times, in inner units; a gap holds the value before it."""
     if name not in record.values:
         assert others is not None
         return others.at(record.time)[:, at]

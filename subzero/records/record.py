@@ -372,7 +372,7 @@ def modelled(run: xr.Dataset, name: str, time: np.ndarray) -> np.ndarray:
 
 
 def fit(run: xr.Dataset, record: Record, name: str) -> Fit:
-    """Compare one channel of a run with what was measured."""
+    """Compare one channel of a run with its measurements."""
     measured = record.values[name]
     error = modelled(run, name, record.time) - measured
     known = np.isfinite(error)

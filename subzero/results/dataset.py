@@ -52,12 +52,12 @@ AXES = {
     ),
     "earth_axis": (["north", "east", "down"], "axis of the earth-fixed frame"),
 }
-"""Named axes of the arrays: their labels, and what they are."""
+"""Named axes of the arrays: their labels, and their meaning."""
 LIBRARIES = ("numpy", "numba", "xarray")
 
 
 class Variable(NamedTuple):
-    """An array of a run: names of its axes, its values and what they are."""
+    """An array of a run: names of its axes, its values and their attributes."""
 
     axes: str | tuple[str, ...]
     values: Any
@@ -101,7 +101,7 @@ def plain_run(
     """Return a run by the names of its dataset; angles in degrees, all other channels in SI and rev/s.
 
     Args:
-        trial: what was run.
+        trial: the trial that was run.
         model: with which model.
         tethered: with the cable.
         run: the run.
@@ -196,7 +196,7 @@ def _tow_velocities(run: Run, model: Model) -> np.ndarray:
 
 
 def _arrays(run: Run, spends: bool) -> dict[str, Variable]:
-    """Return the force breakdown, and the cable's nodes in rows of equal length, NaN behind the last node."""
+    """Return the force breakdown, and the cable's nodes in rows of equal length, NaN after the last node."""
     r = run.recording
     position, tension = _by_node(r, r.position, spends), _by_node(r, r.tension, spends)
     about = (

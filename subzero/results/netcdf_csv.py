@@ -1,4 +1,4 @@
-"""Write what a command leaves behind: runs, summaries and figures; all of them are delivered, or none."""
+"""Write the files of a command: runs, summaries and figures; all of them are delivered, or none."""
 
 from __future__ import annotations
 

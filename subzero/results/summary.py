@@ -82,7 +82,7 @@ def summary_of(runs: dict[str, xr.Dataset], record: Record | None) -> dict[str, 
 
     Args:
         runs: runs by name, tethered, untethered or both.
-        record: what was measured.
+        record: the measured record.
 
     Returns:
         scenario, title, subzero_version, prescribed; each run's `summarise` under its name; and ``measured``:

@@ -37,7 +37,7 @@ from subzero.jit import Record
 
 MANIFEST, STATE, LOCK = "manifest.json", "state.npz", "lock"
 COUNTS = ("behind", "used", "ending", "room")
-"""Of a state: times behind, nodes in use, how the last call ended, nodes at most."""
+"""Of a state: times done, nodes in use, how the last call ended, nodes at most."""
 MINUTE_S = 60.0
 BYTES_A_NODE = 5 * 8
 """Place, tension and arc length."""
@@ -46,7 +46,7 @@ BYTES_A_NODE = 5 * 8
 @checked_arguments
 @dataclass(frozen=True, kw_only=True)
 class Checkpoint:
-    """Where a run keeps where it stands, and how often.
+    """Where a run saves its state, and how often.
 
     >>> Checkpoint(folder="transect.checkpoint", minutes=10.0).minutes
     10.0
@@ -98,7 +98,7 @@ class Keeper:
 
 
 class KeptRun:
-    """Keeps where one run stands.
+    """Saves the state of one run.
 
     Args:
         folder: of this run alone.
@@ -129,7 +129,7 @@ class KeptRun:
         )
 
     def keep(self, now: RunState, times: np.ndarray, stride: int, *, at_once: bool = False) -> None:
-        """Keep where the run stands, if it is time for that, or at once."""
+        """Save the state of the run, if it is time for that, or at once."""
         is_due = at_once or monotonic() - self._kept >= self._every
         if not is_due or now.behind == self._times:
             return
@@ -236,7 +236,7 @@ def _read(path: Path) -> dict[str, np.ndarray]:
 
 @contextmanager
 def _damage_named(path: Path) -> Iterator[None]:
-    """Say of a file that is not what was written what to do."""
+    """Report damage to a file as a UserError with the remedy."""
     try:
         yield
     except (
@@ -290,7 +290,7 @@ def _locked(folder: Path) -> Iterator[None]:
 
 
 def _refuse_another(folder: Path, manifest: Mapping[str, str]) -> None:
-    """Refuse the checkpoint of another simulation; mark a new one as this one's."""
+    """Raise an error for the checkpoint of another simulation; mark a new one as this one's."""
     path = folder / MANIFEST
     if not path.exists():
         unfinished = path.with_suffix(".new")

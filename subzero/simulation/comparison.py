@@ -57,8 +57,8 @@ class Comparison:
     Args:
         tethered: the run with the cable.
         untethered: the same commands, the same code, no cable.
-        trial: what was simulated.
-        measured: what was measured in that trial, if it was.
+        trial: the trial that was simulated.
+        measured: the measured record of that trial, if there is one.
     """
 
     tethered: xr.Dataset
@@ -92,7 +92,7 @@ class Comparison:
         return {"tethered": self.tethered, "untethered": self.untethered}
 
     def fits(self) -> dict[str, dict[str, Fit]]:
-        """Return channel → run → how well that run explains what was measured."""
+        """Return channel → run → how well that run explains the measurements."""
         return {} if self.measured is None else fits(self.runs, self.measured)
 
     def summary(self) -> dict[str, Any]:

@@ -237,7 +237,7 @@ def lay_cable(trial: scenarios.Trial, model: Model, setup: Setup, live: Live, ro
 
 
 def in_words(trial: scenarios.Trial, ending: int, report: NewtonReport, time: float) -> str:
-    """Say when and where the run stopped on its way to `time` [s], and what to try."""
+    """Return when and where the run stopped on its way to `time` [s], and the advice."""
     reason = f"the vehicle's speed is absurd (more than {FASTEST:g} m/s, or not a number)"
     if ending == CABLE_FAILED:
         reason = (

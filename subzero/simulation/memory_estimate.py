@@ -136,7 +136,7 @@ def bytes_a_row() -> float:
 
 
 def fits_in_memory(nodes: int) -> bool:
-    """Say whether shapes of so many nodes in all can be kept, and made into a result."""
+    """Return whether shapes of so many nodes in all can be kept, and made into a result."""
     return fits(COPIES * BYTES_A_NODE * nodes)
 
 

@@ -73,7 +73,7 @@ class Accuracy:
         start_error: of the force in the first samples, from a run that is finer still, as that share. [-]
         start_time: when that is largest. [s]
         halvings: how often steps and segments were halved.
-        rtol: what was asked for. [-]
+        rtol: the requested accuracy. [-]
         proof_error: change of the force to the finest run of a proof, as that share; 0 without a proof. [-]
         proof_time: when that is largest. [s]
         proof_finer: how many times as fine that run is; 0 without a proof.
@@ -96,7 +96,7 @@ class Accuracy:
 
     @property
     def converged(self) -> bool:
-        """Whether the error is what was asked for."""
+        """Whether the error is within the requested accuracy."""
         return self.force_error <= self.rtol
 
 
@@ -360,7 +360,7 @@ def _mean_nodes(run: Run) -> float:
 
 
 def _iterated(run: Run) -> float:
-    """Return nodes times iterations of Newton's method of a run: what it took, half a microsecond each. [-]"""
+    """Return nodes times iterations of Newton's method of a run: its work, half a microsecond each. [-]"""
     return float(run.recording.iterations[-1]) * _mean_nodes(run)
 
 

@@ -282,12 +282,12 @@ def run_trial(
 
 
 def _goes_on(now: RunState, grid: Grid) -> bool:
-    """Say whether a run can and may go on."""
+    """Return whether a run can and may go on."""
     return now.ending in (coupling.FINE, NO_ROOM) and not _took_too_long(now, grid)
 
 
 def _took_too_long(now: RunState, grid: Grid) -> bool:
-    """Say whether a run took more iterations than it may, however many rows were filled at a time."""
+    """Return whether a run took more iterations than it may, however many rows were filled at a time."""
     return bool(now.live.now.iterations > grid.iterations)
 
 
@@ -310,7 +310,7 @@ def _initial_run_state(trial: scenarios.Trial, model: Model, tethered: bool, gri
 
 
 def _further(now: RunState, grid: Grid, last: int) -> RunState:
-    """Go on until `last` times are behind, or it cannot go on."""
+    """Go on until `last` times are done, or it cannot go on."""
     behind, used, ending = run_rows(
         now.setup, now.live, now.recording, grid.times, now.behind, last, now.used, grid.parts, grid.stride
     )
@@ -341,7 +341,7 @@ WENT_WELL, GIVEN_UP = "The run reached its end.", "The run took more iterations 
 
 
 def in_words(ending: int, time: float, setup: Setup, live: Live) -> str:
-    """Say how a run ended: when, where, and what to try."""
+    """Return how a run ended: when, where, and the advice."""
     if ending == coupling.FINE:
         return WENT_WELL
     if ending == coupling.CABLE_FAILED:

@@ -79,7 +79,7 @@ class Held(NamedTuple):
 
 
 class CommandError(UserError, ValueError):
-    """A command that is not four finite numbers; the run stands where it was."""
+    """A command that is not four finite numbers; the run does not advance."""
 
 
 class RunStoppedError(UserError):
@@ -212,12 +212,12 @@ class Simulator:
         return n, rudder, port, starboard
 
     def _message(self) -> str:
-        """Say how the last step ended."""
+        """Return how the last step ended."""
         ending = int(self._held.at[ENDING])
         return WENT_WELL if ending in WELL else in_words(ending, self.time, self._held.setup, self._held.live)
 
     def _check_on(self) -> None:
-        """Refuse to go on where a step has failed."""
+        """Raise an error if a step has failed before."""
         if self._held.at[ENDING] not in WELL:
             raise RunStoppedError(self._message())
 
@@ -241,7 +241,7 @@ def _times(trial: scenarios.Trial) -> np.ndarray:
 
 
 def _exchanges(trial: scenarios.Trial, sample_time: float | None, tethered: bool) -> int:
-    """Return the number of exchanges in a sample, or refuse what cannot be stepped."""
+    """Return the number of exchanges in a sample; raise an error for a trial that cannot be stepped."""
     if trial.motion is not None:
         raise UserError(
             f"'{trial.name}' prescribes its motion, so there is nothing to command. Use subzero.simulate."

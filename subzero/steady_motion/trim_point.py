@@ -127,7 +127,7 @@ class Asked:
     roll: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be asked for."""
+        """Raise an error for a request that is not valid."""
         for field in fields(self):
             number = real(value := getattr(self, field.name))
             if number is None:
@@ -370,7 +370,7 @@ def _balanced(hull: Vehicle, motion: Motion) -> np.ndarray:
 
 
 def check_limits(hull: Vehicle, x: np.ndarray) -> None:
-    """Refuse a steady motion that some actuator cannot hold."""
+    """Raise an error for a steady motion that some actuator cannot hold."""
     beyond = [demand for demand in demands(hull, x) if demand.value > demand.limit]
     if beyond:
         said = "; ".join(

@@ -231,7 +231,7 @@ def _executor(workers: Any, members: int) -> Iterator[tuple[Executor, int]]:
 
 
 def check_workers(workers: Any) -> None:
-    """Refuse what runs no members.
+    """Raise an error for workers that cannot run members.
 
     Raises:
         UserError: neither a number of processes, nor a Dask client, nor an executor.
@@ -248,7 +248,7 @@ def check_workers(workers: Any) -> None:
 
 
 def _is_client(workers: Any) -> bool:
-    """Say whether this is a Dask client; Dask itself need not be there."""
+    """Return whether this is a Dask client; Dask itself need not be installed."""
     return hasattr(workers, "get_executor") and hasattr(workers, "ncores")
 
 

@@ -63,7 +63,7 @@ class Points:
         spreads: the parameters that change.
         values: (members, parameters), in the units of the files.
         design: its name.
-        samples: what was asked for: points, trajectories, or base points of Saltelli's scheme.
+        samples: number that was requested: points, trajectories, or base points of Saltelli's scheme.
         seed: of the points.
         unit: the same points in the unit cube, for a sensitivity; else empty.
     """
@@ -232,7 +232,9 @@ def _normal(name: str, unit: str, numbers: Any) -> Spread:
 
 
 def _check_ends(trial: scenarios.Trial, spreads: tuple[Spread, ...]) -> None:
-    """Refuse a parameter whose least or greatest value the trial refuses; the tails of a normal one may fail later."""
+    """Raise an error for a parameter with an extreme value that the trial refuses; tails of a normal one may fail
+    later.
+    """
     for spread in spreads:
         for end in spread.levels or spread.ends:
             with_parameters(trial, {spread.name: end})

@@ -178,7 +178,7 @@ def _names(what: str, given: Any, default: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _check_scalar(name: str) -> None:
-    """Refuse a name that no run has."""
+    """Raise an error for a name that no run has."""
     head, _, tail = name.rpartition(".")
     known = (
         name in SUMMARY

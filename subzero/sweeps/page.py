@@ -1,4 +1,4 @@
-"""``report.html`` of a sweep: in a few sentences what was varied, what came out and what matters; then all of it.
+"""``report.html`` of a sweep: in a few sentences the parameters, the outcomes and the main effects; then all of it.
 
 The tables are those of the terminal (`subzero.cli.write_sweep`), from the numbers of ``summary.json``.
 """
@@ -31,7 +31,7 @@ COLUMNS = {
     "mean": "mean",
     "standard_deviation": "deviation",
 }
-"""Statistics of a scalar, and what they are called."""
+"""Statistics of a scalar, and their names."""
 SHOWN_EFFECTS = 5
 """Number of parameters that are named for each scalar. [-]"""
 IN_WORDS = 4
@@ -139,7 +139,7 @@ def _outcome(summary: Summary) -> list[Line]:
 
 
 def _answers(summary: Summary) -> list[Answer]:
-    """Return in words what was varied, what came out, and what matters."""
+    """Return in words the parameters, the outcomes and the main effects."""
     found = [Answer(question="What was varied", words=_varied(summary))]
     if summary["scalars"]:
         found.append(Answer(question="What came out", words=_outcome_lines(summary)))

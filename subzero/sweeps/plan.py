@@ -74,7 +74,7 @@ class Plan:
     text: str = ""
 
     def manifest(self) -> dict[str, str]:
-        """Return what its members belong to: anything that could change a number, by its digest."""
+        """Return all settings that could change a number, some as digests, to recognise members of the sweep."""
         return {
             "trial": trial_digest(self.job.trial),
             "parameters": json.dumps(self.points.names),
@@ -235,5 +235,5 @@ def _dotted(table: Mapping[str, Any], above: str = "") -> dict[str, Any]:
 
 
 def _has_spread(table: Mapping[str, Any]) -> bool:
-    """Say whether a table is a spread, and no section without quotes."""
+    """Return whether a table is a spread, and no section without quotes."""
     return any(key in DISTRIBUTION_KEYS for key in table)

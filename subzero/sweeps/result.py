@@ -47,7 +47,7 @@ RANKS = (5.0, 25.0, 50.0, 75.0, 95.0)
 
 @dataclass(frozen=True, kw_only=True)
 class Gathered:
-    """What is looked at when a sweep is done: all scalars, channels of some members, and what was warned of.
+    """Data for figures and page when a sweep is done: all scalars, channels of some members, and the warnings.
 
     Attributes:
         names: of the scalars, those of one's own behind the others.

@@ -1,4 +1,4 @@
-"""Hand the members of a sweep to an executor in batches, and keep what comes back.
+"""Submit the members of a sweep to an executor in batches, and keep the results.
 
 A batch takes about `BATCH_S`, so that handing it out costs little, and less towards the end, so that no worker waits
 for another. Only a few batches are under way at a time, so memory does not grow with the number of members. Where a

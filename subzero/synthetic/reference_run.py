@@ -48,7 +48,9 @@ SHORT = 0.01
 
 
 def seen(setting: Setting, truth: Truth, times: np.ndarray, channels: Iterable[str]) -> dict[str, np.ndarray]:
-    """Return channel → what its sensor shows at times (n,), in the display unit; NaN behind the end of the truth."""
+    """Return channel → the readings of its sensor at times (n,), in the display unit; NaN after the end of the
+    truth.
+    """
     grid = truth.run.times
     out = {}
     for name in channels:
@@ -153,7 +155,7 @@ def simulate_reference(
         hull_step: time step of the hull. [s]
 
     Returns:
-        channel → values (n,) in its display unit, NaN behind the end of the trial.
+        channel → values (n,) in its display unit, NaN after the end of the trial.
 
     Raises:
         NoTruthError: there is no run of this setting.

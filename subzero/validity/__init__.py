@@ -108,7 +108,7 @@ def warnings_of(run: AnyRun) -> tuple[RunWarning, ...]:
 
 
 def as_json(warnings: list[RunWarning]) -> str:
-    """Return warnings as they stand in the attributes of a run."""
+    """Return warnings as JSON, as in the attributes of a run."""
     return json.dumps([warning._asdict() for warning in warnings], ensure_ascii=False)
 
 
@@ -128,6 +128,6 @@ CHECKS: dict[str, Check] = {
     "actuators": actuators,
     "unstable_pitch": unstable_pitch,
 }
-"""Name → check; the names stand in ``summary.json`` and in the attributes of a run."""
+"""Name → check; the names are those in ``summary.json`` and in the attributes of a run."""
 DOUBTS = ("energy_residual", "resolution", "tow_force", "ill_posed_drum", "slack", "closure", "push")
 """Those that doubt the numbers; the others say what happened."""

@@ -1,4 +1,4 @@
-"""Where the equations do not hold, or what was asked for cannot be: air, sea bed, strength, bends, actuators, pitch.
+"""Where the equations do not hold, or a command is impossible: air, sea bed, strength, bends, actuators, pitch.
 
 Also the words for when and for how long, which all warnings share.
 """
@@ -49,7 +49,7 @@ MOST_OF_THE_RUN, LONG, SHORT = 0.9, 10.0, 2.0
 """At a limit throughout: for more than this share of the run, or for longer than this at a stretch; a shorter stretch
 than the last is none: an actuator takes its time. [-], [s], [s]"""
 BEHIND = 0.95
-"""A propeller slower than this share of its command is behind it. [-]"""
+"""A propeller slower than this share of its command lags it. [-]"""
 FINS = {
     "rudder": "rudder_servo",
     "stern_plane_port": "stern_plane_port_servo",
@@ -59,7 +59,7 @@ FINS = {
 
 
 def above_surface(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
-    """Vehicle or cable in the air, where the equations know only water."""
+    """Return warnings of a vehicle or cable in the air, where the equations are those of water."""
     radius = 0.5 * model.vehicle.hull.diameter
     words = "though the equations know only water: what follows is wrong. Start deeper, or command less."
     return _out_of_bounds(run, model, lambda depth: -depth - radius, "above the surface", words)
@@ -224,7 +224,7 @@ def _propeller(run: AnyRun, model: Model) -> list[str]:
 
 
 def _throughout(time: np.ndarray, at_limit: np.ndarray, short: float = SHORT) -> str:
-    """Say for how long a limit holds, if it is most of the run or a long stretch, and not a short one [s]."""
+    """Return for how long a limit holds, if it is most of the run or a long stretch, and not a short one [s]."""
     longest, begin = longest_span(time, at_limit)
     if longest > max(LONG, short):
         return f"from {begin:g} s on for {longest:.3g} s"

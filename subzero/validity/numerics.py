@@ -29,7 +29,7 @@ PROOF, DRUM_PROOF = 4, 8
 """A run so many times as fine, and all that are coarser, have to confirm a force that is doubted; the second on a drum
 that does not hold its cable: a wave in it may be hidden from four times as many segments. [-]"""
 SLOWEST = 0.02
-"""Pay-out rates below this are none. [m/s]"""
+"""Pay-out rates below this count as zero. [m/s]"""
 LEAN = 0.03
 """A load across the cable of this share of its drag turns it by as many radians within the last m1 U²/(½ρπdC_t U²)
 metres before the drum; more counts where no wave comes back to the drum. [-]"""
@@ -45,7 +45,7 @@ SLACK_TIME = 1.0
 CLOSED = 0.01
 """A cable that ends farther from the tow point than this share of its length is not the cable of this vehicle. [-]"""
 PUSHED = 1e-3
-"""A cable that pushes harder than this share of its hardest pull is none. [-]"""
+"""A cable that pushes harder than this share of its hardest pull is not a cable. [-]"""
 ENERGIES = ("propeller_work", "hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term")
 
 
@@ -140,20 +140,20 @@ def _percent(share: float) -> str:
 
 
 def is_resolved(run: AnyRun) -> bool:
-    """Say whether a coarser run has confirmed the tow force of this one within its trial's rtol."""
+    """Return whether a coarser run has confirmed the tow force of this one within its trial's rtol."""
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
     error = accuracy.get("force_error")
     return error is not None and error <= accuracy["rtol"]
 
 
 def starts_otherwise(run: AnyRun) -> bool:
-    """Say whether finer runs of the start alone give another tow force there."""
+    """Return whether finer runs of the start alone give another tow force there."""
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
     return bool(accuracy) and _share(accuracy["start_error"]) > accuracy["rtol"]
 
 
 def is_proved(run: AnyRun, finer: int) -> bool:
-    """Say whether a run so many times as fine has confirmed the tow force, too."""
+    """Return whether a run so many times as fine has confirmed the tow force, too."""
     return is_resolved(run) and json.loads(run.attrs["accuracy"]).get("proof_finer", 0) >= finer
 
 
@@ -188,9 +188,9 @@ def roughness(run: AnyRun) -> np.ndarray:
 def ill_posed_drum(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     """A free drum that does not hold its cable: nothing in the equations says how the cable leaves it.
 
-    One whose friction outweighs m1 U² does say: waves come back to it. A cable that unwinds there all the same is only
-    doubted as long as no coarser run has confirmed its force. Nor is one of which the segments do say it, all the same:
-    the error is found to be small (`DRUM_PROOF`).
+    If the friction outweighs m1 U², waves come back to the drum and determine it. A cable that unwinds there
+    nevertheless is only doubted as long as no coarser run has confirmed its force. Nor is a cable doubted whose
+    segments do determine it: the error is found to be small (`DRUM_PROOF`).
     """
     time, S = run["time"].values, run["cable_length"].values
     if not run.attrs["tethered"] or model.winch is not None or time.size < 3 or is_proved(run, DRUM_PROOF):
@@ -217,7 +217,8 @@ def ill_posed_drum(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
 
 
 def is_left_open(run: AnyRun, trial: scenarios.Trial, model: Model) -> bool:
-    """Say whether nothing determines how the cable leaves its free drum, so that a coarser run confirms too little.
+    """Return whether nothing determines how the cable leaves its free drum, so that a coarser run confirms too
+    little.
 
         T(S) < m1 U²,    |q⊥| > 0.03 ½ρπdC_t U²        q⊥: what water and weight do across the cable
 
@@ -242,7 +243,7 @@ def is_left_open(run: AnyRun, trial: scenarios.Trial, model: Model) -> bool:
 
 
 def only_just_fits(run: AnyRun) -> bool:
-    """Say whether the error of the tow force was estimated, and so close to `rtol` that it may be larger."""
+    """Return whether the error of the tow force was estimated, and so close to `rtol` that it may be larger."""
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
     return (
         bool(accuracy)
@@ -347,7 +348,7 @@ def _slack(run: AnyRun, trial: scenarios.Trial) -> tuple[np.ndarray, float]:
 
 
 def _how_slack(run: AnyRun, share: np.ndarray, longest: float) -> str:
-    """Say how much of the cable is slack, when, and how long."""
+    """Return how much of the cable is slack, when, and how long."""
     time, worst = run["time"].values, int(share.argmax())
     return (
         f"Up to {percent(share[worst])} of the cable that is paid out is slack (at {time[worst]:g} s; first at "
@@ -392,7 +393,7 @@ def push(run: AnyRun, _: scenarios.Trial, __: Model) -> list[str]:
 
 
 def _finer(trial: scenarios.Trial) -> str:
-    """Say what to do about steps that are too long."""
+    """Return the remedy for steps that are too long."""
     return (
         f"Halve cable_step_s ({trial.cable_step:g} s), hull_step_s ({trial.hull_step:g} s) and segment_length_m "
         f"({trial.segment_length:g} m), and see what changes (--check)."
@@ -400,7 +401,7 @@ def _finer(trial: scenarios.Trial) -> str:
 
 
 def _chords(P: np.ndarray) -> np.ndarray:
-    """Return the distances between neighbouring nodes, 0 behind the last (samples, nodes − 1). [m]."""
+    """Return the distances between neighbouring nodes, 0 after the last (samples, nodes − 1). [m]."""
     x, y, z = np.moveaxis(np.diff(P, axis=1), 2, 0)
     lengths: np.ndarray = np.sqrt(x * x + y * y + z * z)
     # Rows are padded with NaN after the last node.
