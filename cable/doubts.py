@@ -27,7 +27,7 @@ LIMP = 1e-6
 SLACK_SHARE = 0.05
 """Slack is warned of from this share of the length on. [-]"""
 ROUNDING = 1e-6
-"""What is beyond surface or bed by less than this is at it. [m]"""
+"""A point beyond surface or bed by less than this is at it. [m]"""
 FOLDED = 1e-3
 """A cable whose segments are shorter than their cable by more than this share is folded somewhere. [-]"""
 

@@ -1,4 +1,6 @@
-"""What a cable did, over time or at rest: tensions, forces, lengths and shapes, with units and how the solving went."""
+"""The result of a cable, over time or at rest: tensions, forces, lengths and shapes, with units and the
+convergence.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,7 @@ class Outcome:
 
     Attributes:
         completed: the run reached its end.
-        message: what happened, when and where, and what to try; one sentence when all went well.
+        message: the outcome, when and where, and the advice; one sentence when all went well.
         iterations: Newton iterations in all.
         worst_residual: residual left in the last step, as a multiple of its tolerance.
         steps: how many steps were taken, with those that were made smaller than the time between two results.
@@ -72,7 +74,7 @@ class History:
         tow_point: position of the tow point relative to the drum (n, 3). [m]
         shapes: node positions relative to the drum, tow point first, one array (nodes, 3) per time. [m]
         tensions: tensions at the nodes, one array (nodes,) per time. [N]
-        outcome: how the run ended; a stopped run keeps what it has.
+        outcome: how the run ended; a stopped run keeps its results up to then.
         scheme: the scheme that was used.
         tow_impulse: impulse of the cable on the vehicle just after each time, where the tow point changes its
             velocity at once (n, 3), zero elsewhere; the tow forces do not show it (`moving_end.jolt`). Empty for other

@@ -233,7 +233,7 @@ def _found(
     steps: int,
     scale: float,
 ) -> Equilibrium:
-    """Return what a line at rest says; its forces are in units of `scale`."""
+    """Return the equilibrium from a line at rest; its forces are in units of `scale`."""
     N = line.ends.count
     return Equilibrium(
         cable=cable,

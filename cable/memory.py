@@ -1,4 +1,4 @@
-"""Whether what a run will keep fits into memory, before it is asked for: a refusal, not a process that is killed."""
+"""Whether the results of a run fit into memory, checked before allocation: an error, not a process that is killed."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def fits(size: float) -> bool:
 
 
 def refuse_unless_it_fits(size: float, what: str, remedy: str) -> None:
-    """Raise a UserError if so many bytes cannot be had: what needs them, and what to change."""
+    """Raise a UserError if so many bytes are not available: it names their purpose, and the setting to change."""
     if not fits(size):
         raise UserError(
             f"{what} needs {size / GIB:.3g} GiB of memory, and {free_memory() / GIB:.3g} GiB are free. {remedy}"

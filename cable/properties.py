@@ -1,4 +1,4 @@
-"""What a cable is: values with units, and the plain numbers that compiled code takes.
+"""The properties of a cable: values with units, and the plain numbers that compiled code takes.
 
 Symbols are those of Feng & Allen (2004), section 2.2; defaults are their Table 1.
 """

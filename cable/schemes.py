@@ -27,7 +27,7 @@ FINEST, COARSEST = 1e-12, 1e-3
 """Between these a tolerance makes sense: rounding is below, and the error of a step above. [-]"""
 LONGEST_RUN_IN_M = 100.0
 READINGS = ("tangent", "drum")
-"""What the paper's new node begins with: the tangent of its neighbour, or the same turned back around the drum."""
+"""The initial tangent of the paper's new node: that of its neighbour, or the same turned back around the drum."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -137,7 +137,7 @@ class Paper:
 
     @property
     def name(self) -> str:
-        """What results call it, ``paper_tangent`` or ``paper_drum``."""
+        """Its name in results, ``paper_tangent`` or ``paper_drum``."""
         return f"paper_{self.reading}"
 
 

@@ -1,4 +1,4 @@
-"""Winches: what turns the drum when it is not the cable alone.
+"""Winches: they turn the drum when it is not turned by the cable alone.
 
     PayOutRate       the length in the water follows a rate, S(t) = S(0) + ∫ rate dt; negative reels in, down to nothing
     Brake            the drum stands: the length is constant

@@ -106,7 +106,7 @@ def names() -> list[str]:
 
 
 def describe(name: str) -> str:
-    """Return what a scenario we ship is, in one line.
+    """Return the description of a scenario we ship, in one line.
 
     Raises:
         ScenarioError: there is no such scenario.

@@ -93,7 +93,7 @@ class Checks:
             self.say(f"{name}[{at}]", why, f"{what} must increase.", values[at].item())
 
     def kind(self, name: str, kinds: tuple[type, ...], optional: bool = False) -> bool:
-        """Check what a field is; return whether it is there and right."""
+        """Check the kind of a field; return whether it is given and right."""
         given = getattr(self._value, name)
         if isinstance(given, kinds):
             return True

@@ -42,7 +42,7 @@ class Number:
         unit: in the file.
         low: least plausible value; of a trial, the least that is allowed.
         high: greatest.
-        source: where the value comes from; of a trial, what it means.
+        source: where the value comes from; of a trial, its meaning.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Contents:
 
 
 def first_line(kind: str, name: str) -> str:
-    """Return what a shipped vehicle or cable is: the first sentence of its file."""
+    """Return the description of a shipped vehicle or cable: the first sentence of its file."""
     return first_sentence(shipped_path(FOLDERS[kind], name).read_text(encoding="utf-8"))
 
 
@@ -104,7 +104,7 @@ def locate(name_or_path: str | Path) -> tuple[str, Source]:
 
 
 def _kind_of(source: Source) -> str:
-    """Return what a user's file is, by the sections that only this kind has."""
+    """Return the kind of a user's file, by the sections that only this kind has."""
     table = source.table
     for kind, key, shape in (("vehicle", "hull", dict), ("cable", "drum", dict), ("trial", "vehicle", str)):
         if isinstance(table.get(key), shape):
@@ -114,7 +114,7 @@ def _kind_of(source: Source) -> str:
 
 
 def contents(name_or_path: str | Path, trial: Trial | None = None) -> Contents:
-    """Return what a file says.
+    """Return the contents of a file.
 
     Args:
         name_or_path: name of a shipped trial, vehicle or cable, or the path of a TOML file.
@@ -166,7 +166,7 @@ def _of_part(kind: str, part: Part) -> Iterator[Number]:
 
 
 def _of_trial(trial: Trial, source: Source) -> Contents:
-    """Return the numbers of a trial that do not stand in another file, and what it changes of those."""
+    """Return the numbers of a trial that are not in another file, and those of other files that it changes."""
     changes, _ = read_changes(source)
     numbers = []
     for name in parameter_names(trial):

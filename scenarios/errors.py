@@ -1,4 +1,4 @@
-"""What is wrong with a file, said so that it can be repaired: all problems at once, each with its place.
+"""Problems with a file, described so that it can be repaired: all problems at once, each with its place.
 
 A problem has three parts: *what* was found and where, *why* it cannot be, and *what to do*.
 """

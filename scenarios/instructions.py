@@ -183,7 +183,7 @@ def gap_at(time: np.ndarray) -> int | None:
 
 
 def gap_in_words(time: np.ndarray, at: int) -> tuple[str, str]:
-    """Return why a gap before sample `at` cannot be, and what to do."""
+    """Return why a gap before sample `at` is not possible, and the remedy."""
     gap, usual = time[at] - time[at - 1], float(np.median(np.diff(time)))
     why = f"nothing is known for {gap:g} s before it, in a record with a sample every {usual:g} s"
     return why, "Fill the gap, or end the run before it."

@@ -160,7 +160,7 @@ def quantity_of(trial: Trial, name: str) -> Row:
 
 
 def declared_ranges(trial: Trial) -> dict[str, tuple[float, float]]:
-    """Return what the files of vehicle, cable and drum declare as plausible: dotted name → least, greatest value.
+    """Return the ranges that the files of vehicle, cable and drum declare: dotted name → least, greatest value.
 
     The files are those that the trial names. A value that [changes] has moved keeps the range of its file.
 
@@ -175,7 +175,7 @@ def declared_ranges(trial: Trial) -> dict[str, tuple[float, float]]:
 
 
 def ranges_in(part: Source) -> dict[str, tuple[float, float]]:
-    """Return what the file of a vehicle or a cable declares as plausible: dotted key → least, greatest value."""
+    """Return the ranges that the file of a vehicle or a cable declares: dotted key → least, greatest value."""
     return {
         key: (float(leaf["range"][0]), float(leaf["range"][1]))
         for key, leaf in leaves(part.table)
@@ -245,7 +245,7 @@ def _source_of(trial: Trial) -> Source:
 # The names that exist, and the problems of a name or a value.
 
 Row = Quantity | Leaf
-"""What is known of a number: its limits, its unit."""
+"""The quantity of a number: its limits, its unit."""
 
 
 @cache

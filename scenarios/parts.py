@@ -144,7 +144,7 @@ def leaves(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Lea
 
 
 def _complaint(leaf: Leaf, model: Leaf, key: str) -> tuple[str, str] | None:
-    """Return why a number of a part cannot be used, and what to do; None if it can."""
+    """Return why a number of a part cannot be used, and the remedy; None if it can."""
     unit = model["unit"]
     unknown = [name for name in leaf if name not in LEAF_KEYS]
     if unknown:
@@ -158,7 +158,7 @@ def _complaint(leaf: Leaf, model: Leaf, key: str) -> tuple[str, str] | None:
 
 
 def tolerance_complaint(value: object, unit: str) -> tuple[str, str] | None:
-    """Return why a value cannot be the tolerance of a number, and what to do; None if it can."""
+    """Return why a value cannot be the tolerance of a number, and the remedy; None if it can."""
     allowed = f"Allowed: above 0{'' if unit == '1' else f' {unit}'}."
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
         return "this is not a finite number", allowed
@@ -166,7 +166,7 @@ def tolerance_complaint(value: object, unit: str) -> tuple[str, str] | None:
 
 
 def value_complaint(value: object, model: Leaf, key: str) -> tuple[str, str] | None:
-    """Return why a value cannot be used for a number of the pattern, and what to do; None if it can."""
+    """Return why a value cannot be used for a number of the pattern, and the remedy; None if it can."""
     low, high, allowed = _limits(model, key)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return "this is not a number", allowed

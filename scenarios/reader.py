@@ -294,7 +294,7 @@ def _check_profile(source: Source, lists: Mapping[str, list[float]]) -> list[Pro
 
 
 def _read_winch(source: Source) -> Read:
-    """Return what turns the drum."""
+    """Return the winch or the free drum."""
     if "winch" not in source.table:
         return {}, []
     values, problems = check_section(source, "winch", source.table["winch"])

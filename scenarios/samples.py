@@ -47,7 +47,7 @@ LEFT_OPEN = ("depth_m", "wet_length_m", "drum_north_m", "drum_east_m", "drum_dow
 """Keys of [start] that a prescribed motion leaves open; the depth unless the motion says it."""
 
 Given = Mapping[str, str | Path]
-"""``commands`` or ``motion`` → a CSV file that replaces what the trial says."""
+"""``commands`` or ``motion`` → a CSV file that replaces the section of the trial."""
 
 LONGEST_HOLD = 1.0
 """The last row of a log is believed for no longer than this: a vehicle turns by tens of degrees in it. [s]"""
@@ -76,11 +76,11 @@ class Samples:
 
     Attributes:
         file: the file as the user named it.
-        key: what messages call the column of times.
+        key: name of the column of times in messages.
         columns: column → values, in the units of the file.
         lines: the line of each sample in a CSV file; None in an inline list, where `key_line` is meant.
         key_line: line of the list of times in a trial file.
-        interpolation: what a motion asks for, see `Motion`.
+        interpolation: interpolation of a motion, see `Motion`.
     """
 
     file: str

@@ -39,7 +39,7 @@ Numbers = Mapping[str, float]
 
 
 class Misfit(NamedTuple):
-    """A number that does not fit the others: its field, the value, why, and what to do."""
+    """A number that does not fit the others: its field, the value, the reason, and the remedy."""
 
     field: str
     found: float

@@ -272,7 +272,7 @@ class Trial:
         current: velocity of the water, north, east, down, the same everywhere. [m/s]
         profile: velocity of the water that is added to it by depth.
         sea_bed: depth of a flat sea bed, which a run that goes below it warns of; 0 is not known. [m]
-        winch: what turns the drum; None for a free drum.
+        winch: the winch that turns the drum; None for a free drum.
         vessel: how the drum moves; None for a drum on the shore.
         commands: the commands to the actuators.
         motion: the prescribed motion.

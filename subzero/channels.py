@@ -91,7 +91,9 @@ class Channel:
 
     @property
     def attributes(self) -> dict[str, str]:
-        """What a variable of a dataset carries: units, long name, symbol, and CF's standard name where it has one."""
+        """The attributes of a variable of a dataset: units, long name, symbol, and CF's standard name where it has
+        one.
+        """
         named = {"standard_name": STANDARD_NAMES[self.name]} if self.name in STANDARD_NAMES else {}
         return {"units": self.unit, "long_name": self.long_name, "symbol": self.symbol, **named}
 
@@ -182,7 +184,7 @@ class AnyRun(Protocol):
 
     @property
     def attrs(self) -> dict[Any, Any]:
-        """Where it came from, how it ended, and what may be wrong with it."""
+        """Its provenance, its outcome, and the warnings."""
 
     def __getitem__(self, name: str, /) -> Any:
         """Return a variable; its ``values`` are an array."""

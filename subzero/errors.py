@@ -32,7 +32,7 @@ LONGEST_PROBLEM = 1000
 
 
 class UserError(Exception):
-    """Something in the request or in a file of the user cannot be used; the message says what to do."""
+    """Something in the request or in a file of the user cannot be used; the message gives the remedy."""
 
 
 class BadValueError(UserError, ValueError):
@@ -83,7 +83,7 @@ def checked(
     Args:
         owner: whose value, such as ``CableProperties``; empty for an argument of a function.
         name: its name.
-        value: what was given.
+        value: the value that was given.
         least: lower limit, allowed itself.
         most: upper limit, allowed itself.
         above: a lower limit that is not allowed itself.
@@ -128,7 +128,7 @@ def whole(name: str, value: object, *, least: int = 0) -> int:
 
 
 def chosen(table: Mapping[str, Line], name: object, what: str) -> Line:
-    """Return a line of a table by its name, or say what there is.
+    """Return a line of a table by its name; raise an error that lists the names if there is none.
 
     Raises:
         UserError: the table has no such line.
@@ -141,7 +141,7 @@ def chosen(table: Mapping[str, Line], name: object, what: str) -> Line:
 
 
 def missing_extra(what: str, libraries: str, extra: str) -> UserError:
-    """Return the error of a feature whose libraries are not installed: what needs them, and how to get them."""
+    """Return the error of a feature whose libraries are not installed: the feature, and how to install them."""
     return UserError(f"{what} needs {libraries}: pip install '{DISTRIBUTION}[{extra}]'.")
 
 

@@ -38,7 +38,7 @@ class Feature:
     Attributes:
         factors: three names of FACTORS.
         unit: of a coefficient, per newton (or per newton metre): "s2/m2" makes N s2/m2; "1" leaves N.
-        words: what it is.
+        words: its description.
     """
 
     factors: tuple[str, str, str]

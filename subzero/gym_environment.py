@@ -57,9 +57,9 @@ LIMITS = {
     "rudder angle [rad]": (-1.0, 1.0),
     "cable length [m]": (0.0, 1000.0),
 }
-"""What is observed, in this order, with the limits of the observation space."""
+"""The observed channels, in this order, with the limits of the observation space."""
 TRUTH = ("wanted_heading", *Observation._fields)
-"""What an info holds: the heading that is wanted [rad], and all that is true."""
+"""The contents of an info: the reference heading [rad], and the true values."""
 
 
 class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -169,7 +169,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
 
     @property
     def felt(self) -> tuple[float, ...]:
-        """What the agent sees, before it is cut to the limits of its space: the values of `LIMITS`."""
+        """The observation of the agent, before it is cut to the limits of its space: the values of `LIMITS`."""
         error, seen = self._wanted - self.seen.heading, self.seen
         return (sin(error), cos(error), seen.yaw_rate, seen.surge_speed, seen.rudder_angle, seen.cable_length)
 
@@ -179,7 +179,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         return (self._wanted, *self.seen)
 
     def _observed(self) -> np.ndarray:
-        """Return what the agent sees, within the limits of its space."""
+        """Return the observation of the agent, within the limits of its space."""
         space: Any = self.observation_space
         return np.clip(np.array(self.felt, dtype=np.float32), space.low, space.high)
 
@@ -252,7 +252,7 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         return env.reward(rudder), stopped
 
     def _observed(self) -> np.ndarray:
-        """Return what the agents see, within the limits of their space (num_envs, 6)."""
+        """Return the observations of the agents, within the limits of their space (num_envs, 6)."""
         space: Any = self.observation_space
         return np.clip(np.array([our.felt for our in self._ours], dtype=np.float32), space.low, space.high)
 

@@ -43,7 +43,7 @@ class Model:
         drum: the drum, free unless a winch turns it.
         current: velocity of the water, north, east, down, the same everywhere. [m/s]
         profile: velocity of the water that is added to the current by depth.
-        winch: what turns the drum; None for a free drum.
+        winch: the winch that turns the drum; None for a free drum.
         vessel: how the drum moves; None for a drum on the shore.
         missing: a force that all of these lack; None for nothing.
     """

@@ -49,7 +49,7 @@ class BoxRule(NamedTuple):
 
 
 class Ends(NamedTuple):
-    """What holds at the vehicle (8) and at the drum (9)-(11)."""
+    """The conditions at the vehicle (8) and at the drum (9)-(11)."""
 
     north: float
     """Velocity of the tow point, earth axes [m/s]."""

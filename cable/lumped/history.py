@@ -168,7 +168,7 @@ class Course(NamedTuple):
 
     Attributes:
         times: (n,). [s]
-        values: place of the tow point (3), of the drum (3), what a winch is asked for (1): (n, 7). [m], or [N]
+        values: place of the tow point (3), of the drum (3), setpoint of a winch (1): (n, 7). [m], or [N]
         rates: their rates of change (n, 7).
     """
 
@@ -187,7 +187,7 @@ class Fixed(NamedTuple):
 
 
 class Row(NamedTuple):
-    """What is recorded at a time: force on the vehicle (3,), tension at the drum, length, positions and tensions."""
+    """The results at one time: force on the vehicle (3,), tension at the drum, length, positions and tensions."""
 
     tow_force: np.ndarray
     drum_tension: float
@@ -254,7 +254,7 @@ def _leg(course: Course, k: int, x: float) -> np.ndarray:
 
 
 def _row(rope: Rope) -> Row:
-    """Return what there is to record of the present state; tensions at nodes lie between those of the springs."""
+    """Return the results of the present state; tensions at nodes lie between those of the springs."""
     N, T = rope.ends.count, np.empty(rope.ends.count + 1)
     rest, pull = rope.spring[REST, 1 : N + 1], rope.spring[PULL, 1 : N + 1]
     at_drum = max(float(rope.ends.drum_pull), 0.0)

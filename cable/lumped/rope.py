@@ -35,7 +35,7 @@ SMOOTH_STEPS = 3
 
 
 class RopeEnds(Record):
-    """What a lumped cable has once.
+    """The fields of a lumped cable that exist once.
 
     Attributes:
         count: number of springs.
@@ -56,7 +56,7 @@ class RopeEnds(Record):
         drum_pull: T(S). [N]
         tow_force: on the vehicle, earth axes (3,). [N]
         by_payout: ∂ℓ/∂U of the last spring; 0 where its length is prescribed. [s]
-        wanted: what a winch is asked for: length [m] or tension [N].
+        wanted: setpoint of a winch: length [m] or tension [N].
     """
 
     count: int
@@ -86,7 +86,7 @@ class Rope(NamedTuple):
     """The state of a lumped cable and the work space to advance it; entry 0 of arrays over springs is unused.
 
     Attributes:
-        ends: what there is once.
+        ends: the fields that exist once.
         position, velocity, momentum: of the nodes (3 levels, nodes, 3); momentum is that of the lump. [m, m/s, kg m/s]
         stretched: L (3 levels, nodes). [m]
         spring: numbers of the springs (rows as named above, nodes).

@@ -194,7 +194,7 @@ def spring_state(T: float) -> float:
 
 @inner
 def drum_friction(friction: float, payout: float) -> tuple[float, float]:
-    """Return what friction holds back, C_f/R_d rounded off at rest [N], and its slope by the pay-out rate [N s/m]."""
+    """Return the friction of the drum, C_f/R_d rounded off at rest [N], and its slope by the pay-out rate [N s/m]."""
     if payout <= 0.0:
         return 0.0, friction / CREEP
     size = sqrt(payout * payout + CREEP * CREEP)

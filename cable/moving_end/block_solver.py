@@ -256,7 +256,7 @@ def _take_off(A: np.ndarray, B: np.ndarray, out: np.ndarray) -> None:
 
 @inner
 def solve_wide(blocks: np.ndarray, pivots: np.ndarray, last: int, r: np.ndarray) -> None:
-    """Overwrite r (blocks, 4) with the solution, given what `factor_wide` left."""
+    """Overwrite r (blocks, 4) with the solution, given the factors from `factor_wide`."""
     L, D, U, K, V = blocks[0], blocks[1], blocks[2], blocks[3], blocks[4]
     for j in range(last, 0, -1):
         for row in range(SIZE):

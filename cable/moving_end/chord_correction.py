@@ -1,4 +1,4 @@
-"""What straight segments miss of the arc they stand for, put right to second order in the segment's length.
+"""Corrections of straight segments for the arc that they represent, to second order in the segment's length.
 
 On an arc of curvature κ that turns by θ = κℓ within a segment, with V_t' = κV_n (inextensible), a polygon with the
 right velocities at its nodes makes these errors, all of order θ²:
@@ -81,7 +81,7 @@ def correct_for_arc(line: Line, led: bool, work: Load) -> None:
 
 @inlined
 def _missing_gain(sliding: float, oblique: float) -> float:
-    """Return what the normal gain has beyond 1, over θ², for λ and U_t²/U_n²; at most 1 either way."""
+    """Return the normal gain minus 1, over θ², for λ and U_t²/U_n²; at most 1 either way."""
     held = 1.0 - sliding
     return min(max((1.0 + 2.0 * held - 2.0 * held * held * oblique) / 12.0 - 0.25 * sliding, -1.0), 1.0)
 

@@ -115,7 +115,7 @@ def _differentiate_drum(line: Line, by_length: float, pulled: bool, Qt: float, w
 
 @compiled
 def _length_wanted(line: Line, drum: DrumNumbers) -> float:
-    """Return how long the last segment has to be: as long as it is, or what a winch asks for. [m]."""
+    """Return how long the last segment has to be: as long as it is, or as a winch requires. [m]."""
     if drum.control != LENGTH:
         return line.ends.last_length[NOW]
     return drum.setpoint - line.ends.settled

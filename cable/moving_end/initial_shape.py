@@ -109,7 +109,9 @@ def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, p
 
 @compiled
 def start_in_water(line: Line, water: Water, c: CableNumbers, work: Load) -> None:
-    """Fill the water's velocity at the nodes and the segments' momenta, at all levels, from what moves at the start."""
+    """Fill the water's velocity at the nodes and the segments' momenta, at all levels, from the motion at the
+    start.
+    """
     sample_water(line, water, line.ends.time)
     for level in (NOW, BEFORE):
         for j in range(line.ends.count + 1):

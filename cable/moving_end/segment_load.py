@@ -128,7 +128,7 @@ def evaluate_load(T: float, slip: float, gain: float, a0: float, c: CableNumbers
 
 @inner
 def differentiate_load(slip: float, a0: float, c: CableNumbers, work: Load) -> None:
-    """Fill ∂q/∂V and ∂q/∂d of what `evaluate_load` has filled.
+    """Fill ∂q/∂V and ∂q/∂d of the load filled by `evaluate_load`.
 
     With W = U_t + slip, the drag across k_n (|U_⊥| I + U_⊥ U_⊥ᵀ/|U_⊥|) by U_⊥, ∂U_⊥/∂V = P = I − t tᵀ,
     ∂U_⊥/∂t = −(t Uᵀ + U_t I) and ∂t/∂d = (I − g t tᵀ)/r:

@@ -108,7 +108,7 @@ class Tow(Record):
 
 
 class Ends(Record):
-    """What a cable has once: its growing end at the drum, its tow point, and how it is divided and solved.
+    """The fields of a cable that exist once: its growing end at the drum, its tow point, its division and its solver.
 
     Attributes:
         count: number of segments.
@@ -118,9 +118,9 @@ class Ends(Record):
         loose: length of the cable that a drum has thrown out ahead of what the water takes (3 levels,). [m]
         ahead: how much faster the drum gives cable than the water takes it (3 levels,). [m/s]
         since_loose: steps since cable was last loose; no more are counted than `KNOWN_STEPS`.
-        drum_mode: what the drum does (`cable.drum`).
+        drum_mode: the state of the drum (`cable.drum`).
         drum_pull: tension at the drum at level NEW. [N]
-        drum_force: the cable's pull on it, with what acts across the last half segment (3,). [N]
+        drum_force: the cable's pull on it, with the load of the last half segment (3,). [N]
         drum_velocity: of the drum at level NEW (3,). [m/s]
         time: of level NOW. [s]
         previous_step: t_now − t_before, 0 after a start. [s]
@@ -153,7 +153,7 @@ class Line(NamedTuple):
     """The state of a cable; segment j lies between nodes j−1 and j, so index 0 of segment arrays is unused.
 
     Attributes:
-        ends: what there is once.
+        ends: the fields that exist once.
         position: node positions (3 levels, nodes, 3). [m]
         velocity: velocities of the material at the nodes (3 levels, nodes, 3). [m/s]
         momentum: momentum ∫p ds of the segments (3 levels, nodes, 3). [kg m/s]
@@ -201,7 +201,7 @@ def new_line(capacity: int) -> Line:
 
 @made_once
 def _new_ends() -> Ends:
-    """Return what an empty line has once."""
+    """Return the fields of an empty line that exist once."""
     tow = Tow(
         force=np.zeros(3),
         past=np.zeros((2, 3)),
@@ -234,7 +234,7 @@ def _new_ends() -> Ends:
 
 
 def _per_node(n: int) -> dict[str, Any]:
-    """Return what an empty line has of each of n nodes, by name."""
+    """Return the arrays of an empty line over n nodes, by name."""
     vectors = {name: np.zeros((3, n, 3)) for name in ("position", "velocity", "momentum", "water")}
     return vectors | {
         "tension": np.zeros((3, n)),

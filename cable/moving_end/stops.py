@@ -1,4 +1,4 @@
-"""Why a run of the default scheme stopped: when, where, and what cures such stops.
+"""Why a run of the default scheme stopped: when, where, and the remedy for such stops.
 
 What to try was found on random trials that stop (`python -m benchmarks.stops` follows the advice, and counts): a limp
 cable wants shorter steps; a stiff one longer segments, in which it cannot fold (shorter steps make it worse); one that
@@ -24,7 +24,7 @@ SHORT_SEGMENTS = 3.0
 
 
 class Names(NamedTuple):
-    """What the settings are called where the advice is read."""
+    """The names of the settings where the advice is read."""
 
     step: str = "step"
     segment: str = "segment_length"
@@ -36,11 +36,11 @@ class Names(NamedTuple):
 def describe_stop(
     time: float, line: Line, drum: DrumNumbers, c: CableNumbers, names: Names | None = None
 ) -> str:
-    """Return why a run could not go on beyond `time` [s], where, and what to try.
+    """Return why a run could not go on beyond `time` [s], where, and the advice.
 
     Args:
         time: of the last result. [s]
-        line: the cable, with what was tried on level NEW.
+        line: the cable, with the failed step on level NEW.
         drum: the drum or winch.
         c: the cable's numbers.
         names: of the settings.
@@ -81,7 +81,7 @@ def _worst(line: Line) -> str:
 
 
 def _remedy(line: Line, drum: DrumNumbers, c: CableNumbers, words: Names) -> str:
-    """Return what cures most stops of this kind, the surest first."""
+    """Return the remedy for most stops of this kind, the surest first."""
     if hasattr(c, "bending_stiffness"):
         return f"a longer {words.segment}, or bending_stiffness = 0"
     length = float(line.ends.settled + line.ends.last_length[NOW])

@@ -44,7 +44,7 @@ TAUT = 1e-2
 TAKEN_UP = 1e-9
 """A free drum that would take up more cable than this in a step has not been solved: try a smaller one. [m]"""
 MOST_DRUM_CHANGES = 4
-"""How often one step may change its mind about what the drum does."""
+"""How often the state of the drum may change within the solution of one step."""
 MAX_ITERATIONS = 40
 MAX_HALVINGS = 8
 ABSOLUTE_TOLERANCE = 1e-13

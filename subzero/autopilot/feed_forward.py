@@ -91,7 +91,7 @@ class CableInTurn:
 
         Args:
             length: of the cable in the water. [m]
-            paid_out: S', how fast the drum lets it go. [m/s]
+            paid_out: S', the rate at which the drum gives cable. [m/s]
             forward: speed of the tow point through the water along the hull. [m/s]
             starboard: across it. [m/s]
         """

@@ -116,7 +116,7 @@ def step_response(
 
     Args:
         time: (n,). [s]
-        values: what was stepped (n,).
+        values: the stepped quantity (n,).
         goal: where to.
         start: when. [s]
         band: share of the step within which it has settled.
@@ -140,7 +140,8 @@ def step_response(
 def spiral(
     time: np.ndarray, yaw_rate: np.ndarray, rudder: np.ndarray, hold: float, start: float
 ) -> dict[str, float]:
-    """Return what a Dieudonné spiral shows: slope_per_s at small rudders, loop_height_deg_s and residual_deg_s at zero.
+    """Return indices of a Dieudonné spiral: slope_per_s at small rudders, loop_height_deg_s and residual_deg_s at
+    zero.
 
     Args:
         time: (n,). [s]

@@ -44,7 +44,7 @@ STEEPEST = 1e-3
 KEPT = STATE_NAMES[2:]
 """States of the linear model of a hull: all but north and east."""
 LENGTH = len(STATE_NAMES)
-"""Place of the cable's length behind the states of the hull."""
+"""Index of the cable's length, after the states of the hull."""
 
 
 class Subsystem(NamedTuple):
@@ -263,7 +263,7 @@ class Mode(NamedTuple):
     Attributes:
         pole: λ; of a pair the one above the real axis. [1/s]
         scaled: λ L/U; −1 decays to 37 % while the hull moves on by its own length.
-        time_constant: −1/Re λ, infinite for an integrator, negative for what grows. [s]
+        time_constant: −1/Re λ, infinite for an integrator, negative for a growing mode. [s]
         damping: ζ = −Re λ/|λ|; 1 for a real pole that decays, −1 for one that grows, 0 for an integrator.
         period: of the oscillation, infinite without one. [s]
     """

@@ -162,13 +162,13 @@ class Manoeuvre:
 
     Attributes:
         meaning: in words.
-        program: what commands it.
+        program: the program that commands it.
         size: by default. [degree; 1]
         unit: of the size.
         duration: of the manoeuvre after the straight run. [s]
-        index: what measures it, from `indices`.
-        channels: what of a run the index takes, in its order, SI and radians.
-        numbers: what else it takes, by name.
+        index: the function that measures it, from `indices`.
+        channels: channels of a run that the index takes, in its order, SI and radians.
+        numbers: further arguments of it, by name.
         takes_size_as: the name of the size among these, if it takes it.
     """
 

@@ -29,7 +29,7 @@ from subzero.files.read_file import MOST_OF_A_PROGRAM, read_bytes
 from subzero.model import Model, model_of
 
 Build = Callable[[Tuning, float, CableModel], Autopilot]
-"""What makes an autopilot, from a tuning, a sample time [s] and a cable model."""
+"""The factory of an autopilot, from a tuning, a sample time [s] and a cable model."""
 
 
 def from_file(path: str | Path) -> Build:
@@ -57,7 +57,7 @@ def from_file(path: str | Path) -> Build:
 
 
 def built(path: str | Path, build: Build, tuning: Tuning, sample_time: float, cable: CableModel) -> Autopilot:
-    """Return what the function `make` of a file makes.
+    """Return the autopilot that the function `make` of a file makes.
 
     Raises:
         UserError: it raised an error of its own.
@@ -89,7 +89,7 @@ LONGEST_SAMPLE_S = 60.0
 """A controller that sleeps longer holds nothing. [s]"""
 
 AUTOPILOTS: dict[str, Build] = {"pid": _pid, "lqr": _lqr}
-"""Name → what makes one, from a tuning, a sample time [s] and a cable model."""
+"""Name → factory of an autopilot, from a tuning, a sample time [s] and a cable model."""
 
 FEED_FORWARD: dict[str, Callable[[Tuning, scenarios.Trial, float, Model], CableModel]] = {
     "none": lambda tuning, trial, sample_time, believed: NoCable(),
@@ -116,7 +116,7 @@ def make(
         feed_forward: one of `FEED_FORWARD`.
         sample_time: of the controller. [s]
         tuning: gains; those of `tune` on the trial's vehicle by default.
-        believed: what the autopilot believes of vehicle, cable and water; the trial's by default.
+        believed: the autopilot's assumed vehicle, cable and water; the trial's by default.
 
     Raises:
         UserError: there is no such autopilot or feed-forward; a sample time of nothing; with these gains and this

@@ -30,7 +30,7 @@ class Sensor:
     """One sensor of one channel; all in the unit of `Observation`: SI, radians.
 
     Attributes:
-        channel: what it measures, a field of `Observation`.
+        channel: the channel that it measures, a field of `Observation`.
         period: time between samples; 0 samples whenever it is asked. [s]
         noise: standard deviation of each sample, white.
         bias: constant error.
@@ -158,7 +158,7 @@ class _Running:
             self._next += (behind + 1) * self.sensor.period
 
     def _sample(self, truth: float, passed: float) -> float:
-        """Return what the sensor makes of the truth, `passed` seconds after the sample before."""
+        """Return the reading of the sensor for a true value, `passed` seconds after the sample before."""
         s = self.sensor
         self._walk += s.drift * math.sqrt(passed) * self._rng.standard_normal()
         value = truth + s.bias + self._walk + s.noise * self._rng.standard_normal()

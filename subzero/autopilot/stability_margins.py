@@ -146,7 +146,7 @@ def check_stable(tuning: Tuning, sample_time: float, estimates: Estimates | None
         estimates: a heading by full state feedback instead of the PID.
 
     Raises:
-        UserError: a loop is unstable at one of the speeds: which, and what to change.
+        UserError: a loop is unstable at one of the speeds: which, and the remedy.
     """
     for loop in WEIGHTS:
         for speed, linear in zip(tuning.speeds, tuning.linear, strict=True):

@@ -189,7 +189,7 @@ class PartFile:
     Attributes:
         name: as it was named.
         before: its text; "" if there is no file.
-        ranges: dotted name → what it declares as plausible.
+        ranges: dotted name → the range that the file declares as plausible.
         names: dotted names of the free numbers in it.
     """
 
@@ -199,7 +199,7 @@ class PartFile:
     names: tuple[str, ...]
 
     def text(self, found: Calibration) -> str:
-        """Return its text with what was found; "" if there was none."""
+        """Return its text with the estimates; "" if there were none."""
         if not self.before:
             return ""
         own = {vehicle_file.section_of(name)[1]: found[name] for name in self.names}
@@ -236,7 +236,7 @@ def files_of(given: Logged, names: Sequence[str], vehicle: str | Path | None) ->
 
 
 def source_of(trial: Logged) -> Source:
-    """Return what a calibrated file says of a record: its bytes if it is a file, else its values."""
+    """Return the provenance of a record for a calibrated file: its bytes if it is a file, else its values."""
     path = Path(trial.record.source)
     if path.is_file():
         digest = hashlib.sha256(path.read_bytes())

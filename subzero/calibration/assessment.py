@@ -1,4 +1,5 @@
-"""What a calibration is worth: directions that records do not determine, profiles, held-out errors, what to fly next.
+"""Assessment of a calibration: directions that records do not determine, profiles, held-out errors, trials to fly
+next.
 
     Λ = D^½ (M_ff⁻¹ − D⁻¹) D^½,   Λ e = λ e
 
@@ -31,7 +32,7 @@ from subzero.diagnosis.inference import (
 )
 
 UNDETERMINED_ABOVE = 0.5
-"""What is left of the standard deviation beforehand, from which on the records do not determine it. [-]"""
+"""Remaining share of the prior standard deviation from which on the records do not determine a direction. [-]"""
 SMALL_PART = 0.2
 """Parts of a direction smaller than this share of the largest, in priors, are not reported. [-]"""
 AT_BOUND = 1e-9
@@ -69,7 +70,7 @@ def correlation(M: np.ndarray) -> np.ndarray:
 
 
 def directions(numbers: Sequence[Number], M: np.ndarray) -> tuple[Direction, ...]:
-    """Return what the records do not determine, from the covariance of the free numbers (n, n)."""
+    """Return the directions that the records do not determine, from the covariance of the free numbers (n, n)."""
     prior = np.array([number.prior_sd for number in numbers])
     shares = prior[:, None] * (np.linalg.inv(M) - np.diag(prior**-2)) * prior
     values, vectors = np.linalg.eigh(0.5 * (shares + shares.T))
@@ -263,7 +264,7 @@ def strange(work: Fitted) -> tuple[str, ...]:
 
 
 def advice(numbers: Sequence[Number], work: Fitted, progress: Progress) -> tuple[Advice, ...]:
-    """Return the safe trials of the library, by what they would add on the free numbers."""
+    """Return the safe trials of the library, by the information they would add on the free numbers."""
     problem, count = work.problem, len(numbers)
     shared = [k for k, entry in enumerate(problem.entries) if entry.record < 0]
     M = _with_new_start(work.M[np.ix_(shared, shared)])
@@ -299,7 +300,7 @@ def _information(coming: Problem, z: np.ndarray) -> np.ndarray:
 
 
 def _with_new_start(M: np.ndarray) -> np.ndarray:
-    """Return the covariance of what trials share and of the start of a new one."""
+    """Return the covariance of the parameters that trials share and of the start of a new one."""
     start = [parameter.tolerance**2 for effect in START for parameter in effect.parameters]
     whole = np.zeros((M.shape[0] + len(start),) * 2)
     whole[: M.shape[0], : M.shape[0]] = M

@@ -58,7 +58,7 @@ class Number:
     Attributes:
         name: dotted.
         unit: of its file.
-        nominal: what the file has.
+        nominal: the number in the file.
         prior_sd: standard deviation of its deviation, beforehand.
         tolerance: how far a healthy vehicle may be from a number that is known.
         step: a deviation that is noticeable.

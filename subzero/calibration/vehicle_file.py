@@ -56,7 +56,7 @@ def text_of(before: str, estimates: Mapping[str, Estimate], provenance: Mapping[
 
 
 def _number_line(line: str, estimate: Estimate) -> str:
-    """Return the line of a number with what was estimated in it."""
+    """Return the line of a number with its estimate."""
     leaf = next(iter(tomllib.loads(line).values()))
     key = line.partition("=")[0].rstrip()
     said = leaf if isinstance(leaf, Mapping) else {"unit": estimate.unit}
@@ -112,7 +112,7 @@ def _check(text: str, estimates: Mapping[str, Estimate]) -> None:
 
 
 def provenance(records: Sequence[Source], base: str, when: str, version: str, held: str) -> dict[str, Any]:
-    """Return what a calibrated file says of where it comes from.
+    """Return the provenance section of a calibrated file.
 
     Args:
         records: that it was made of.

@@ -69,7 +69,7 @@ class Outputs:
         check_pictures(self.width, self.animate)
 
     def kinds(self) -> dict[str, Any]:
-        """Return what `subzero.cli.write_results.write_all` is to make."""
+        """Return the outputs that `subzero.cli.write_results.write_all` makes."""
         return {"width": self.width, "kind": self.figures, "exports": self.export}
 
 
@@ -395,7 +395,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _aloud(output_mode: OutputMode) -> Iterator[None]:
-    """Let a command speak as it was asked to; with --verbose, say what runs, and in the end how long it took."""
+    """Set the output mode of a command; with --verbose, report the versions, and in the end how long it took."""
     set_output_mode(output_mode)
     began = perf_counter()
     if output_mode.verbose:
@@ -430,7 +430,7 @@ def _note_command(words: Sequence[str]) -> None:
 
 
 def _never_choke(*streams: Any) -> None:
-    """Let a terminal that lacks a letter show ``?`` instead."""
+    """Show ``?`` instead of letters that the terminal lacks."""
     for stream in streams:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")

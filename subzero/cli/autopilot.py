@@ -40,7 +40,7 @@ STEP_COMMANDS = {
     "depth_step": ("depth", "stern_plane_port_command"),
     "speed_step": ("heading", "propeller_command"),
 }
-"""What the figure shows: the answer of the vehicle and the command."""
+"""Channels in the figure: the response of the vehicle and the command."""
 
 
 @Parameter(name="*")

@@ -236,7 +236,7 @@ def _sorted(files: list[Path], scenario: str | None) -> tuple[str | None, list[P
 def extended_run(
     trial: scenarios.Trial, path: Path | None, own: Path | None
 ) -> tuple[scenarios.Trial, dict[str, Any]]:
-    """Return a trial and what to run it with, as an extended model says (``--with``), and the user's own causes."""
+    """Return a trial and its simulation, as an extended model says (``--with``), and the user's own causes."""
     if path is None:
         if own is not None:
             raise UserError(
@@ -281,7 +281,7 @@ def _read(paths: list[Path], scenario: str | None, commands: str | None) -> list
 
 
 def simulated(setting: Setting) -> xr.Dataset:
-    """Return what the vehicle does in a setting, with the steps that the diagnosis took."""
+    """Return the run of the vehicle in a setting, with the steps that the diagnosis took."""
     from subzero.simulation.run import simulate
 
     every = setting.trial.every or setting.trial.cable_step  # all of them, however long the record is
@@ -290,7 +290,7 @@ def simulated(setting: Setting) -> xr.Dataset:
 
 
 def _ask(logged: list[Logged], own: tuple[Effect, ...], search: Search, output_mode: OutputMode) -> Verdict:
-    """Diagnose under a progress bar; an interrupt ends it with what it has, if it has anything."""
+    """Diagnose under a progress bar; an interrupt ends it with its partial results, if it has any."""
     from subzero.cli.write_diagnosis import print_plan
     from subzero.diagnosis.api import diagnose_trials
 

@@ -41,7 +41,7 @@ WARM_S = 1.0
 
 
 class Check(NamedTuple):
-    """A result held to something exact: what, how far it is off, how far it may be, relatively."""
+    """A result compared with an exact one: its name, its error, the error allowed, relatively."""
 
     name: str
     error: float
@@ -122,7 +122,8 @@ def add_to(app: cyclopts.App) -> None:
     """Add the commands to the command line."""
 
     def completion(shell: Shell, /) -> int:
-        """Print what makes a shell complete commands and options; put it where your shell looks for completions.
+        """Print the script that makes a shell complete commands and options; put it where your shell looks for
+        completions.
 
         Args:
             shell: bash, zsh or fish.

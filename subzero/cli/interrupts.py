@@ -1,4 +1,4 @@
-"""What a signal does to a command: it ends with exit code 130, soon, whatever it is doing.
+"""The effect of a signal on a command: it ends with exit code 130, soon, whatever it is doing.
 
 Ctrl-C, SIGTERM or a closed terminal raises `KeyboardInterrupt` in the main thread, so that files are put right and the
 command says what it left. Compiled code may not return to Python for a while, and a full pipe never: so a thread, which
@@ -68,7 +68,7 @@ def leave(code: int) -> Never:
 
 
 def reset() -> None:
-    """Forget what a former command of this process set."""
+    """Clear the messages that a former command of this process set."""
     _exit_message.clear()
     _interrupted.clear()
     if _last_words.locked():
@@ -100,7 +100,7 @@ def _state() -> str:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> Never:
-    """Raise what Ctrl-C raises."""
+    """Raise the exception that Ctrl-C raises."""
     _interrupted.set()
     raise KeyboardInterrupt
 

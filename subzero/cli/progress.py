@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 COMPILING = "Compiling what is not compiled yet (all of it takes about half a minute, once)…"
 
 PATIENCE_S = 1.0
-"""What takes less needs no bar. [s]"""
+"""Shorter work needs no bar. [s]"""
 STANDSTILL_S = 20.0
 """Work that has not moved for so long is reported to stand still; a rate is watched for so long before it counts.
 [s]"""
@@ -188,7 +188,7 @@ _listening: list[object] = []
 
 
 def costs_of(trial: scenarios.Trial, tethered: bool = True) -> str:
-    """Return what costs time in a run of a trial, the vehicle's steps or the cable's, and what to change."""
+    """Return the costs of a run of a trial, the vehicle's steps or the cable's, and the setting to change."""
     from subzero.model import Model
     from subzero.simulation.memory_estimate import work_of
 

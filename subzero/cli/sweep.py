@@ -58,7 +58,7 @@ def sweep(
 
 
 def _swept(spec: Path, out: Path | None, executor: Any, retry: bool) -> tuple[dict[str, Any], OutputFolder]:
-    """Run what a file asks for, write all of it, and return the summary and where the files are."""
+    """Run the sweep of a file, write all of it, and return the summary and the paths of the files."""
     from subzero.files.atomic_output import open_output_folder
     from subzero.sweeps.api import finished
     from subzero.sweeps.plan import read_plan

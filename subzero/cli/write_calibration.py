@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from subzero.files.atomic_output import OutputFolder
 
 ENDINGS = (".toml", "_cable.toml", ".json", "_numbers.png", "_errors.png", "_profiles.png")
-"""Of the files that are written, behind the name of the vehicle."""
+"""Endings of the files that are written, after the name of the vehicle."""
 
 
 def files_of(out: Path) -> tuple[str, ...]:
@@ -63,7 +63,7 @@ def write_all(found: Calibration, output_folder: OutputFolder, stem: str) -> Non
 def print_calibration(
     found: Calibration, output_folder: OutputFolder, out: Path, *, output_mode: OutputMode = PLAIN
 ) -> None:
-    """Print the numbers, what the records do not determine, and where the files are."""
+    """Print the numbers, the undetermined directions, and the paths of the files."""
     with output_mode.emit(plain(mapping(found)) | output_folder.files()):
         _print(found, output_folder, out, Console())
 
@@ -95,7 +95,7 @@ WORTH_FLYING = 1.2
 
 
 def rows(found: Calibration) -> list[tuple[str, str, str, str, str]]:
-    """Return a row for every number: name, before, after, the interval of 95 %, and what to know of it."""
+    """Return a row for every number: name, before, after, the interval of 95 %, and remarks."""
     return [
         (
             _short(estimate.name),
@@ -109,7 +109,7 @@ def rows(found: Calibration) -> list[tuple[str, str, str, str, str]]:
 
 
 def _mark(estimate: Estimate) -> str:
-    """Return by how much a number has changed, and whether the records say so."""
+    """Return by how much a number has changed, and whether the records determine it."""
     change = f"{100.0 * estimate.change:+.1f} %" if estimate.before else ""
     words = [
         change,

@@ -179,7 +179,7 @@ def write_all(
         verdict: of `subzero.diagnose`.
         logged: the records that were explained.
         output_folder: where to.
-        run: simulates what the page replays.
+        run: simulates the settings that the page replays.
         effects: causes of the user's own.
         effects_file: where they are from.
     """
@@ -269,7 +269,7 @@ def page_of_diagnosis(
 
 
 def about(logged: Sequence[Logged]) -> dict[str, str]:
-    """Return what records are, each in a line."""
+    """Return descriptions of the records, each in a line."""
     return {
         trial.name: f"{trial.record.source}, trial {trial.setting.trial.name}. {' '.join(trial.notes)}".strip()
         for trial in logged
@@ -372,7 +372,7 @@ def _best(verdict: Verdict) -> tuple[str, Extended | None]:
 
 
 def _about(trial: Logged) -> dict[str, object]:
-    """Return what diagnosis.json says of a record."""
+    """Return the entry of a record in diagnosis.json."""
     return {
         "source": trial.record.source,
         "scenario": trial.setting.trial.name,

@@ -77,7 +77,7 @@ def write_sweep(
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """What figures show: points, what was run, what came of it, what matters; and what stands above and below."""
+    """The data of the figures: points, results, main effects; and the texts above and below."""
 
     points: Points
     job: Job
@@ -167,7 +167,7 @@ def _in_short(summary: dict[str, Any]) -> str:
 def print_sweep(
     summary: dict[str, Any], output_folder: OutputFolder, output_mode: OutputMode = PLAIN
 ) -> None:
-    """Print what came of a sweep."""
+    """Print the outcomes of a sweep."""
     with output_mode.emit(summary | output_folder.files()):
         _print(summary, output_folder, Console())
 
@@ -186,7 +186,7 @@ def _print(summary: dict[str, Any], output_folder: OutputFolder, console: Consol
 
 
 def _rich(rows: Rows, *, words: int) -> Table:
-    """Return rows as the terminal shows them: `words` columns of words, and numbers behind."""
+    """Return rows as the terminal shows them: `words` columns of words, then numbers."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for at, name in enumerate(rows.header):
         table.add_column(escape(name), justify="left" if at < words else "right", overflow="fold")

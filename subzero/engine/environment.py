@@ -14,7 +14,7 @@ from subzero.model import Model
 
 
 def drum_of(model: Model) -> DrumProperties | Winch:
-    """Return the free drum, or what turns it."""
+    """Return the free drum, or the winch."""
     winch = model.winch
     if winch is None:
         return model.drum

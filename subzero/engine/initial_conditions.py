@@ -254,7 +254,7 @@ def _track(trial: scenarios.Trial) -> np.ndarray:
 
 
 def hang_between(setup: Setup, live: Live, trial: scenarios.Trial, model: Model) -> None:
-    """Move the drum to where the trial has it, and let the cable in the water hang between it and the tow point.
+    """Move the drum to its place in the trial, with the cable in the water hanging between it and the tow point.
 
     Raises:
         cable.HoldError: a cable that does not reach, or has no equilibrium.
@@ -277,7 +277,7 @@ def hang_between(setup: Setup, live: Live, trial: scenarios.Trial, model: Model)
 
 @compiled
 def start_at_rest(setup: Setup, live: Live) -> None:
-    """Fill what a cable that is laid out has at the start: the water around it, its momenta, its energy."""
+    """Fill the state of a cable that is laid out at the start: the water around it, its momenta, its energy."""
     start_in_water(live.line, setup.water, setup.fixed.cable, live.load)
     energy_flow(live.line, setup.fixed.cable, live.load, live.now.ledger.cable_new)
     for i in range(FLOWS):

@@ -85,7 +85,7 @@ class Now(Record):
         missed: by how much the pull came out other than straight on from the two before it, in the last exchange (3,).
             [N]
         guess: pull at the end of the exchange that is being tried (3,). [N]
-        change: what the last guess was changed by (3,). [N]
+        change: the last change of the guess (3,). [N]
         tow: tow point there, relative to the drum (3,). [m]
         Z: answer of the pull to the tow point's place (3, 3). [N/m]
         tow_before: the same for the guess before (3,). [m]
@@ -121,7 +121,7 @@ class Setup(NamedTuple):
         orders, track: the commands to the vehicle, or its motion (LINEAR_ROWS or KNOT_ROWS, n).
         water: how the water moves; its origin is the drum's place at the start.
         led: motion of the drum, and setpoint of its winch, see `cable.drum_motion` (n, 8).
-        added, terms: what the model lacks, see `MissingForce.numbers` (7, n), (m, 5); empty for nothing.
+        added, terms: the missing force, see `MissingForce.numbers` (7, n), (m, 5); empty for none.
     """
 
     fixed: Fixed
@@ -134,7 +134,7 @@ class Setup(NamedTuple):
 
 
 class Live(NamedTuple):
-    """What changes during a run.
+    """The state of a run.
 
     Attributes:
         now: where it stands.

@@ -94,17 +94,17 @@ NUMBERS = (
 
 @dataclass(frozen=True, kw_only=True)
 class Slider:
-    """What one slider moves.
+    """The numbers that one slider moves.
 
     Args:
         name: of the first number that it moves.
-        words: what that is.
+        words: their name in words.
         unit: of it in files.
         low: where the slider ends at its left.
         high: at its right.
         nominal: where the trial has it; of a list, the value of largest size.
         shares: numbers of the trial → what they are of the slider's value: a list keeps its shape over time.
-        declared: what its file declares as plausible; None if it declares nothing.
+        declared: the range that its file declares as plausible; None if it declares none.
     """
 
     name: str
@@ -192,7 +192,7 @@ def _keys(trial: Trial, name: str) -> list[str]:
 
 
 def _allowed(trial: Trial, name: str, low: float, high: float) -> tuple[float, float]:
-    """Return a range without what the file would refuse."""
+    """Return a range without the values that the file would refuse."""
     row = quantity_of(trial, name)
     least, most = (row.low, row.high) if isinstance(row, Quantity) else row.get("limits", (low, high))
     return max(low, least), min(high, most)
@@ -327,7 +327,7 @@ class Exploration:
         return summarise(self.nominal)
 
     def numbers(self, summary: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
-        """Return rows of the table: words, nominal number, number, and what has changed.
+        """Return rows of the table: words, nominal number, number, and the change.
 
         Args:
             summary: of the run, by `subzero.results.summary.summarise`.

@@ -57,7 +57,7 @@ TITLES = {
     "drum": "Drum",
     "run": "Run",
 }
-"""Section of a trial → what stands above its sliders."""
+"""Section of a trial → the heading above its sliders."""
 
 
 @contextmanager
@@ -85,7 +85,9 @@ def address(port: int) -> Iterator[tuple[Access, socket.socket]]:
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """What a tab shows of an answer: it, the summary of its run, and its replay as JSON; None where there is none."""
+    """The contents of a tab for an answer: it, the summary of its run, and its replay as JSON; None where there is
+    none.
+    """
 
     answer: Answer
     summary: dict[str, Any] | None
@@ -96,7 +98,7 @@ class Page:
     """The page of a trial.
 
     Args:
-        exploration: the trial, its run, and what runs others.
+        exploration: the trial, its run, and the function that runs others.
     """
 
     def __init__(self, exploration: Exploration) -> None:
@@ -178,11 +180,11 @@ class Page:
 
     @cached_property
     def as_in_file(self) -> Shown:
-        """What a tab shows at first."""
+        """The initial contents of a tab."""
         return self.shown(self.exploration.answer({}))
 
     def shown(self, answer: Answer) -> Shown:
-        """Return what a tab shows of an answer."""
+        """Return the contents of a tab for an answer."""
         from subzero.results.summary import summarise
 
         if answer.run is None:
@@ -328,7 +330,7 @@ class Tab:
         self.newest.ask(dict(self.values))
 
     def save(self) -> None:
-        """Write a scenario file of the sliders into the working folder, and say what to do with it."""
+        """Write a scenario file of the sliders into the working folder, and show how to use it."""
         name = str(self.file.value or "")
         try:
             _check_name(name)

@@ -288,7 +288,7 @@ def shape_3d(run: xr.Dataset, title: Title, count: int = SHAPES) -> Figure:
 
     Args:
         run: a run with a cable; of another, the track of the hull alone is drawn.
-        title: what stands above it.
+        title: the title above it.
         count: how many shapes, spread over the run.
     """
     figure = Figure(figsize=(SIDE, SIDE), dpi=style.DPI, facecolor="white")

@@ -290,11 +290,11 @@ MODEL_WORDS = {
     "extended": "extended model",
     CALIBRATED: "calibrated within tolerances",
 }
-"""What the models are called wherever they are drawn."""
+"""Names of the models in all figures."""
 
 RIVAL = "rival: "
 BAND = 1.96
-"""The noise band holds 95 % of what a right model leaves."""
+"""The noise band holds 95 % of the residuals of a right model."""
 
 SMOOTH = 0.5
 """Residuals are shown as dots, and as a line smoothed over so long. [s]"""
@@ -323,14 +323,16 @@ def draw_diagnosis(verdict: Verdict, title: Title) -> dict[str, Figure]:
 
 
 class Drawn(NamedTuple):
-    """What is drawn of a record: its curves, the noise of its channels, and the verdict that they belong to."""
+    """The data of the figures of a record: its curves, the noise of its channels, and the verdict that they belong
+    to.
+    """
 
     curves: Curves
     noise: Mapping[str, Misfit]
     verdict: Verdict
 
     def words(self, model: str) -> str:
-        """Return what a model is called."""
+        """Return the name of a model."""
         if model in MODEL_WORDS and not (model == CALIBRATED and self._is_rival):
             return MODEL_WORDS[model]
         model = model.replace(CALIBRATED, "none")
@@ -386,7 +388,7 @@ class Drawn(NamedTuple):
         return self.curves.used.get(channel, np.isfinite(self.curves.measured[channel]))
 
     def left(self, channel: str, model: str) -> np.ndarray:
-        """Return what a model leaves unexplained of the samples that were used."""
+        """Return the residuals of a model at the samples that were used."""
         residual = self.curves.measured[channel] - self.curves.models[model][channel]
         used: np.ndarray = residual[self.used(channel)]
         return used

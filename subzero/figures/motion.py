@@ -66,7 +66,7 @@ def figure_6(runs: Runs, record: Record | None, title: Title) -> Figure:
 
 
 def attitude(runs: Runs, record: Record | None, title: Title) -> Figure:
-    """Draw what the actuators do and how the hull answers: six panels."""
+    """Draw the actuators and the response of the hull: six panels."""
     figure, panels = sheet(3, 2, title)
     for axes, (name, words) in zip(panels, ATTITUDE.items(), strict=True):
         channel_panel(axes, runs, name, record)
@@ -107,7 +107,7 @@ def _starboard_plane(runs: Runs, axes: Axes) -> None:
 
 
 def _rudder(axes: Axes, runs: Runs, longest: xr.Dataset) -> None:
-    """Draw what the rudder is commanded, and where it is; a run in which it does the same has no line of its own."""
+    """Draw the rudder's command and its angle; a run in which they are the same has no line of its own."""
     _command(axes, longest, "rudder_command", r"$\delta_{rc}$, $\delta_r$ [degree]", label="commanded")
     drawn: list[np.ndarray] = []
     for which, run in runs.items():

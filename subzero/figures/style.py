@@ -112,7 +112,7 @@ LETTERS = 26
 
 @dataclass(frozen=True, kw_only=True)
 class Title:
-    """What stands above a figure: the trial in words, and the name of its scenario; and what warns of it, below."""
+    """The texts of a figure: above it the trial in words, and the name of its scenario; below it the warnings."""
 
     words: str
     scenario: str

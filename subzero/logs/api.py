@@ -85,7 +85,7 @@ def read_log(path: str | Path, map: str | Path | None = None) -> Record:
 
 
 def undecided(found: Imported) -> UserError:
-    """Return the error that asks what names and values of a log do not decide."""
+    """Return the error that asks for the decisions which names and values of a log leave open."""
     questions = found.mapping.questions
     remedy = f"write the map with subzero import {found.source} --map-out map.toml, edit it, and give it with --map"
     title = f"The log {found.source} cannot be imported before this is decided:"

@@ -84,7 +84,9 @@ class Contradiction(NamedTuple):
 
 
 class Findings(NamedTuple):
-    """What the values say: the units left of each channel, the ties that it agrees with, and the contradictions."""
+    """The evidence in the values: the units left of each channel, the ties that it agrees with, and the
+    contradictions.
+    """
 
     units: Mapping[str, list[str]]
     agrees: Mapping[str, list[str]]
@@ -117,7 +119,7 @@ class _Slope(NamedTuple):
 
 
 def findings(columns: Mapping[str, Measured], time: np.ndarray) -> Findings:
-    """Return what the values of all columns together say of each.
+    """Return the evidence of the values of all columns together, for each.
 
     Args:
         columns: channel → column.
@@ -288,7 +290,7 @@ def _contradiction(
     possible: Mapping[str, list[str]],
     variables: Mapping[str, str],
 ) -> Contradiction:
-    """Return what stated units break, and which one of them alone could be another one."""
+    """Return the ties that stated units break, and which one of them alone could be another one."""
     repairs = tuple(
         (channel, unit)
         for channel in slope.channels

@@ -69,7 +69,7 @@ def _text(value: object) -> str:
 
 
 def map_content(path: str | Path) -> tuple[dict[str, Any], frozenset[str]]:
-    """Return what a map says, and the columns of the log that it names.
+    """Return the contents of a map, and the columns of the log that it names.
 
     Raises:
         UserError: it cannot be read, or is no map.

@@ -153,7 +153,7 @@ def _clock_of_numbers(name: str, values: np.ndarray, written: str) -> tuple[Cloc
 
 
 def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> Map:
-    """Return what every column of a log is, by names and values.
+    """Return the meaning of every column of a log, by names and values.
 
     Args:
         table: the log.

@@ -38,7 +38,7 @@ class Column:
     Args:
         values: numbers, or seconds of dates and times; NaN in gaps, and in all rows if it is not wanted. Shape (rows,).
         unit: as the file writes it, empty if it does not.
-        form: what its cells are: "number", "text", or a form of `logs.times`.
+        form: the form of its cells: "number", "text", or a form of `logs.times`.
     """
 
     values: np.ndarray
@@ -52,12 +52,12 @@ class Column:
 
 
 class Table(NamedTuple):
-    """What a log holds.
+    """The contents of a log.
 
     Args:
         source: the file, as the user named it.
         columns: name → column; all of one length.
-        notes: what was left out in reading, in sentences.
+        notes: rows and columns that were left out in reading, in sentences.
         stride: of so many rows of the file one is kept.
     """
 

@@ -34,7 +34,7 @@ STEP_LIMITS_S = 5e-3, 5.0
 [s]"""
 
 DAY_FIRST, MONTH_FIRST, EITHER, BOTH = ", day first", ", month first", ", day or month first", ", both orders"
-"""What is added to the form of dates with slashes until the whole column says which number is the day."""
+"""Ending of the form of dates with slashes until the whole column shows which number is the day."""
 
 _CLOCK = re.compile(r"(?:(\d+) days?,? )?(\d{1,3}):(\d\d)(?::(\d\d(?:[.,]\d*)?))? ?([AP]M)?$")
 _DATE = re.compile(

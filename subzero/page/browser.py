@@ -69,7 +69,7 @@ def check_film() -> None:
     """Raise an error if a package that is needed to film is not installed, before anything is simulated.
 
     Raises:
-        UserError: says what to install.
+        UserError: with the packages to install.
     """
     _needed()
     missing = [name for name in ("imageio_ffmpeg", "PIL") if find_spec(name) is None]

@@ -66,7 +66,7 @@ def _scenario_word(command: str) -> str:
 
 
 def _outcome(label: str, run: dict[str, Any]) -> list[Line]:
-    """Return what one reads first of a run."""
+    """Return the headlines of a run."""
     is_complete = run["outcome"] == "completed"
     end = NOTHING if run["time_at_end_s"] is None else f"{run['time_at_end_s']:g} s"
     message = "" if is_complete else f": {run['outcome_message']}"
@@ -92,7 +92,7 @@ def _sections(tables: list[Table], figures: Mapping[str, Figure]) -> list[Sectio
 
 
 def _tables(summary: dict[str, Any], labels: list[str]) -> list[Table]:
-    """Return the numbers: indices of a manoeuvre, what one reads first, and how well a record is explained."""
+    """Return the numbers: indices of a manoeuvre, the headlines, and how well a record is explained."""
     tables = [Table(title="Numbers", header=("", *labels), groups=number_groups(summary))]
     if all("indices" in summary[label] for label in labels):
         tables.insert(0, Table(title="Indices", header=("", *labels), groups=[_indices(summary, labels)]))
@@ -117,7 +117,7 @@ def _indices(summary: dict[str, Any], labels: list[str]) -> list[tuple[str, ...]
 
 
 def _sources(run: xr.Dataset) -> dict[str, str]:
-    """Return what a run came from: the scenario as it was read, all parameters, the versions of the libraries."""
+    """Return the provenance of a run: the scenario as it was read, all parameters, the versions of the libraries."""
     parameters = json.dumps(json.loads(run.attrs["parameters"]), indent=2, ensure_ascii=False)
     versions = {"subzero": run.attrs["subzero_version"], **json.loads(run.attrs["versions"])}
     return {

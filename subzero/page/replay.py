@@ -92,7 +92,7 @@ def encode(actors: tuple[Actor, ...], record: Record | None = None) -> dict[str,
 
 
 def _actor(actor: Actor) -> dict[str, Any]:
-    """Return what one vehicle does."""
+    """Return the motion of one vehicle."""
     run = actor.run
     kept = _spread(run.sizes["time"], MOST_SAMPLES)
     channels = {
@@ -183,7 +183,7 @@ def _base64(values: np.ndarray) -> str:
 def as_run(record: Record, beside: xr.Dataset, used: Mapping[str, np.ndarray]) -> xr.Dataset | None:
     """Return a record as a run at its own times, to be shown as a vehicle; None if it does not say where that went.
 
-        dx/dt = R(roll, pitch, heading) (u, v, w), from the position of the run `beside` at the first sample
+        dx/dt = R(roll, pitch, heading) (u, v, w),    from the position of the other run at the first sample
 
     Places that were measured are taken as they are; else they are reckoned so, with v and w as measured, 0 where they
     are not. A record with neither places nor speed and heading does not say where the vehicle went.

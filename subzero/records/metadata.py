@@ -36,7 +36,7 @@ OVER = ("water", "ground")
 
 @dataclass(frozen=True, kw_only=True)
 class Metadata:
-    """What is known of a record.
+    """The metadata of a record.
 
     Attributes:
         source: where it comes from.

@@ -71,7 +71,7 @@ class PlainRun:
     Attributes:
         variables: by name.
         coordinates: by name.
-        attrs: where it came from, how it ended, and what may be wrong with it.
+        attrs: its provenance, its outcome, and the warnings.
     """
 
     variables: dict[str, Variable]
@@ -307,7 +307,7 @@ def _closure_error(run: Run, values: dict[str, np.ndarray], model: Model) -> np.
 
 
 def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) -> dict[str, Any]:
-    """Return what the result came from; no clock, so that two runs are alike to the last bit."""
+    """Return the provenance of the result; no clock, so that two runs are alike to the last bit."""
     motion = trial.motion
     return {
         "scenario": trial.name,
@@ -331,7 +331,7 @@ def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) 
 
 @cache
 def _versions() -> dict[str, str]:
-    """Return the versions of what computed it; looked up once, for each time a file is read."""
+    """Return the versions of the software; looked up once, for each time a file is read."""
     return {
         "subzero_version": version(DISTRIBUTION),
         "versions": json.dumps({name: version(name) for name in LIBRARIES}),

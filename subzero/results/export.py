@@ -60,7 +60,7 @@ def export(run: xr.Dataset, path: str | Path, kind: str | None = None) -> None:
 
 
 def writer_of(kind: str) -> Callable[[xr.Dataset, Path], None]:
-    """Return what writes a kind of file, once its library is known to be there.
+    """Return the writer of a kind of file, once its library is known to be there.
 
     Raises:
         UserError: there is no such kind, or no library for it.
@@ -181,7 +181,7 @@ def _shapes(run: xr.Dataset) -> list[np.ndarray] | None:
 
 
 def _reported(run: xr.Dataset) -> Iterator[tuple[int, str]]:
-    """Give the level and the words of what a run says of itself."""
+    """Return the level and the words of the messages of a run."""
     for load in json.loads(run.attrs.get("warnings", "[]")):
         yield WARNING, f"{load['check']}: {load['message']}"
     if run.attrs["outcome"] != "completed":
@@ -252,7 +252,9 @@ def _line(points: np.ndarray) -> dict[str, Any]:
 
 
 def write_mat(run: xr.Dataset, path: Path) -> None:
-    """Write every variable as one of MATLAB's, with structures of units, meanings and axes, and what a run says."""
+    """Write every variable as one of MATLAB's, with structures of units, meanings and axes, and the run's
+    attributes.
+    """
     from scipy.io import savemat
 
     everything: dict[str, Any] = {str(name): _matlab(run[name].values) for name in run.variables}
@@ -317,7 +319,7 @@ STANDARD_NAMES = {
 }
 """Our name → that of the CF standard name table, where it means the same, sign included."""
 UDUNITS = {"rev/s": "revolution s-1"}
-"""Our unit → what UDUNITS calls it."""
+"""Our unit → its name in UDUNITS."""
 FORCE, MOMENT = ("X", "Y", "Z"), ("K", "M", "N")
 
 
@@ -374,4 +376,4 @@ KINDS: dict[str, tuple[str, str, Callable[[xr.Dataset, Path], None]]] = {
     "parquet": (".parquet", "pyarrow.parquet", write_parquet),
     "cf": ("_cf.nc", "netCDF4", write_cf),
 }
-"""Kind → ending of its files, the library that it needs, what writes it."""
+"""Kind → ending of its files, the library that it needs, its writer."""

@@ -1,4 +1,4 @@
-"""A run in a few numbers: what one reads first, each with its unit in its name.
+"""A run in a few numbers: the main results, each with its unit in its name.
 
 Plain numbers, texts and mappings only, so a summary can be printed, stored as JSON and compared. A number
 that does not exist (the heading of a run without samples, the balance of a prescribed run) is None.

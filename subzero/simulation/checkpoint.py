@@ -92,7 +92,7 @@ class Keeper:
         self._folder, self._every, self._runs = folder, every, 0
 
     def next_run(self) -> KeptRun:
-        """Return what keeps the next run."""
+        """Return the keeper of the next run."""
         self._runs += 1
         return KeptRun(self._folder / f"run-{self._runs}", self._every)
 
@@ -149,7 +149,7 @@ class KeptRun:
 
 
 def _filled(now: RunState, stride: int) -> dict[str, np.ndarray]:
-    """Return what the arrays of a recording hold so far; the last row may be one that the next time replaces."""
+    """Return the filled parts of the arrays of a recording; the last row may be one that the next time replaces."""
     last = row_of(now.behind - 1, stride)
     is_whole = (now.behind - 1) % stride == 0
     nodes = now.used if is_whole else now.used + int(now.recording.nodes[last])
@@ -190,7 +190,7 @@ def _capacity(started: RunState, state: Mapping[str, np.ndarray]) -> int:
 
 
 def _kind(name: str) -> str:
-    """Return what the lines of an array of a recording are."""
+    """Return the meaning of the lines of an array of a recording."""
     return "nodes" if name in BY_NODE else "times" if name in BY_TIME else "rows"
 
 
@@ -227,7 +227,7 @@ def _write(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def _read(path: Path) -> dict[str, np.ndarray]:
-    """Return the arrays of a file, if it is what was written."""
+    """Return the arrays of a file; raise an error if its contents have changed."""
     with _damage_named(path):
         inside = BytesIO(without_digest(path.read_bytes()))
         with np.load(inside, allow_pickle=False) as file:
@@ -256,12 +256,12 @@ def _damage_named(path: Path) -> Iterator[None]:
 
 @contextmanager
 def opened(checkpoint: Checkpoint, label: str, manifest: Mapping[str, str]) -> Iterator[Keeper]:
-    """Give what keeps the runs of a simulation.
+    """Return the keeper of the runs of a simulation.
 
     Args:
         checkpoint: where and how often.
         label: of this simulation among those that share the folder.
-        manifest: what they belong to: what → its digest.
+        manifest: the settings they belong to: name → its digest.
 
     Raises:
         UserError: it holds another simulation, another command has it, it cannot be written or read.
@@ -309,7 +309,7 @@ def _refuse_another(folder: Path, manifest: Mapping[str, str]) -> None:
 
 @contextmanager
 def _disk_errors_named(folder: Path) -> Iterator[None]:
-    """Say of a checkpoint that cannot be written what to do."""
+    """Report a checkpoint that cannot be written as an error with the remedy."""
     try:
         yield
     except OSError as error:

@@ -230,7 +230,7 @@ class Refinement:
 
     @property
     def warnings(self) -> tuple[RunWarning, ...]:
-        """What the change says about the run."""
+        """The meaning of the change for the run."""
         if self.finer.attrs["outcome"] != self.run.attrs["outcome"]:
             words = f"With half the steps and segments the run is {self.finer.attrs['outcome']}, and not "
             return (RunWarning("refinement", f"{words}{self.run.attrs['outcome']}: neither can be trusted."),)
@@ -272,7 +272,7 @@ def check(
     later: Later = (),
     progress: Progress | None = None,
 ) -> Refinement:
-    """Run a trial at its own steps and with half of them, and say what changes.
+    """Run a trial at its own steps and with half of them, and return the changes.
 
     Args:
         scenario: name of a shipped scenario, path of a scenario file, or a trial.

@@ -186,7 +186,7 @@ REMEDIES = {
     "paper_tangent": 'scheme = "moving_end", the default, or a longer cable_step_s',
     "paper_drum": 'scheme = "moving_end", or scheme = "paper_tangent", whose new node is not turned around the drum',
 }
-"""What to try; a free drum lets segments shorter than m1/(½ρπdC_t) ring, a quarter of a metre for Table 1."""
+"""The advice; a free drum lets segments shorter than m1/(½ρπdC_t) ring, a quarter of a metre for Table 1."""
 
 
 def run_as_printed(

@@ -42,7 +42,7 @@ ROUND = (1, 2, 5)
 
 
 class Work(NamedTuple):
-    """What a run has to do, about: segments at most, and how long vehicle and cable take in all [µs]."""
+    """An estimate of the work of a run: segments at most, and how long vehicle and cable take in all [µs]."""
 
     segments: int
     hull: float
@@ -55,7 +55,7 @@ MICROSECONDS_A_SEGMENT = 10.0
 
 
 def work_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Work:
-    """Return what a run has to do, about."""
+    """Return an estimate of the work of a run."""
     segments, rows = most_segments(trial, model) if tethered else 0, trial.duration / trial.cable_step
     hull = MICROSECONDS_A_HULL_STEP * trial.duration / trial.hull_step
     return Work(segments, hull, MICROSECONDS_A_SEGMENT * rows * segments)
@@ -104,7 +104,7 @@ def thinning_notice(trial: scenarios.Trial) -> str:
 
 
 def bytes_of_results(trial: scenarios.Trial, model: Model, tethered: bool, rows: float) -> float:
-    """Return what so many results of a run take, about."""
+    """Return an estimate of the memory that so many results of a run take."""
     if not tethered:
         return rows * bytes_a_row()
     longest = max(
@@ -114,7 +114,7 @@ def bytes_of_results(trial: scenarios.Trial, model: Model, tethered: bool, rows:
 
 
 def refuse_what_cannot_fit(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> None:
-    """Raise a UserError if what a run keeps will not fit into memory."""
+    """Raise a UserError if the results of a run will not fit into memory."""
     rows = row_of(grid.times.size - 1, grid.stride) + 1.0
     size = COPIES * rows * bytes_a_row() + BYTES_OF_TRACE * grid.times.size
     if tethered:
@@ -131,7 +131,7 @@ def refuse_what_cannot_fit(trial: scenarios.Trial, model: Model, tethered: bool,
 
 @cache
 def bytes_a_row() -> float:
-    """Return what a recording keeps of the vehicle at one time."""
+    """Return the memory of a recording for the vehicle at one time."""
     return float(sum(values.nbytes for values in new_recording(1, 0)))
 
 

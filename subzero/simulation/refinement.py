@@ -222,7 +222,7 @@ def prove(
     budget: Budget,
     progress: Progress | None = None,
 ) -> Accuracy:
-    """Compare a run that is doubted with finer ones, up to `finest` times as fine; stop at what contradicts it.
+    """Compare a run that is doubted with finer ones, up to `finest` times as fine; stop at one that contradicts it.
 
     Args:
         trial: a tethered one of the default scheme.
@@ -230,7 +230,7 @@ def prove(
         run: of the trial, as `run_converged` gives it; of its recording, trace and iterations are needed.
         accuracy: of the run.
         finest: one of `PROOFS`.
-        budget: what `run_converged` has left of it.
+        budget: the budget left by `run_converged`.
         progress: called with the fraction that is done of each run.
 
     Returns:
@@ -297,7 +297,7 @@ def _every_other(times: np.ndarray) -> np.ndarray:
 def _accuracy(
     trial: scenarios.Trial, take: Take, budget: Budget, run: Run, change: Change, halvings: int
 ) -> Accuracy:
-    """Return the accuracy of a run; `change` is what the last halving brought.
+    """Return the accuracy of a run; `change` is that of the last halving.
 
     A run that will be repeated anyhow needs no look at its start.
     """
@@ -323,7 +323,7 @@ def _after_start(coarse: Run, fine: Run) -> Change:
 
 
 def _start(trial: scenarios.Trial, take: Take, budget: Budget, run: Run, halvings: int) -> Change:
-    """Return what finer steps and segments change in the first samples; nothing where no finer run gets so far."""
+    """Return the change by finer steps and segments in the first samples; 0 where no finer run gets so far."""
     times = run.all_times[: START_ROWS + 1]
     for finer in START_REFINEMENTS if times.size > 1 else ():
         grid = _only_traced(times, finer * 2**halvings)
@@ -350,7 +350,7 @@ def _change(run: Run, fine: Run, first: int, largest: float) -> Change:
 
 
 def _largest(run: Run) -> float:
-    """Return the largest force of a run, at least what means something. [N]."""
+    """Return the largest force of a run, but at least `SMALLEST_FORCE`. [N]."""
     return max(float(np.linalg.norm(run.recording.trace[:, :3], axis=1).max()), SMALLEST_FORCE)
 
 

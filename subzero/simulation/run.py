@@ -86,7 +86,7 @@ def simulate(
     Returns:
         one variable per channel of `subzero.channels`, the force breakdown, the cable's shape and tensions; units on
         every variable; scenario, parameters, versions and outcome as attributes. Look at ``attrs["outcome"]``: a run
-        that could not go on keeps what it has.
+        that could not go on keeps its results up to then.
 
     Raises:
         scenarios.ScenarioError: the scenario cannot be used.
@@ -137,7 +137,7 @@ def simulate_plainly(
 def _kept(
     checkpoint: Checkpoint | None, trial: scenarios.Trial, model: Model, tethered: bool, later: Later
 ) -> Iterator[Keeper | None]:
-    """Give what keeps the runs of a simulation, None without a checkpoint."""
+    """Return the keeper of the runs of a simulation, None without a checkpoint."""
     if checkpoint is None:
         yield None
         return
@@ -177,7 +177,7 @@ def simulate_many(
         progress: called with the fraction that is done.
 
     Returns:
-        what `simulate` gives for each trial, in their order, the same to the last bit.
+        the results of `simulate` for each trial, in their order, the same to the last bit.
 
     Raises:
         UserError: the first trial that cannot be used; nothing is simulated then.
@@ -217,7 +217,7 @@ def _as_fine_as_asked(
 
 
 def _taker(model: Model, keeper: Keeper | None) -> Take:
-    """Return what makes a tethered run of a trial for `subzero.simulation.refinement`."""
+    """Return the function that makes a tethered run of a trial for `subzero.simulation.refinement`."""
     return lambda each, grid, reported: run_trial(each, model, True, reported, grid=grid, keeper=keeper)
 
 
@@ -336,7 +336,7 @@ NAMES = Names(
     rate="pay_out_rate_m_s",
     yielding='control = "constant_tension"',
 )
-"""What the settings of a cable are called in a trial file."""
+"""The names of the settings of a cable in a trial file."""
 WENT_WELL, GIVEN_UP = "The run reached its end.", "The run took more iterations than it may."
 
 

@@ -83,7 +83,7 @@ class CommandError(UserError, ValueError):
 
 
 class RunStoppedError(UserError):
-    """The simulation cannot go on: when, where, what to try. `Simulator.result` keeps what it has."""
+    """The simulation cannot go on: when, where, the advice. `Simulator.result` keeps the results up to then."""
 
 
 class Simulator:
@@ -140,7 +140,7 @@ class Simulator:
 
     @property
     def observation(self) -> Observation:
-        """What is true now."""
+        """The true values now."""
         return Observation(*self._held.seen.tolist())
 
     @property
