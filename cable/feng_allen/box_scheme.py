@@ -8,7 +8,7 @@ shorter than 0.4 Δs loses its first node. Segment length and time step have not
 
 *Time.* TR-BDF2 (Bank and others, 1985) with γ = 2 − √2: a trapezoidal stage to t + γ Δt, then backward
 differences over t, t + γ Δt, t + Δt. Both stages read ẏ = a (y − h) with the same a = 2/(γ Δt). It is
-L-stable and stiffly accurate: the tension, which has no rate of its own, is solved anew at the end of every
+L-stable and stiffly accurate: the tension, which has no rate of its own, is solved again at the end of every
 step and does not remember (no staircase); and as the last stage differences states only, the tension is of
 second order too. SDIRK2, whose stages are of first order, gives its inertia part to first order only.
 

@@ -3,7 +3,7 @@
     df/dt (t_new) ≈ a₀ f_new + a₁ f_now + a₂ f_before
 
 Exact for quadratic polynomials. It damps the stiff part completely (the cable's sideways motion settles in
-milliseconds, far below a step) and gives the tension, which has no time derivative of its own, anew at every step:
+milliseconds, far below a step) and gives the tension, which has no time derivative of its own, again at every step:
 no staircase. The first step has no f_before. There velocities follow from positions by the trapezoidal rule, which
 needs the velocity at the start (known) and is exact for quadratic motions too,
 

@@ -119,7 +119,7 @@ def _goal(wanted: Callable[[float], Wanted], time: float, before: float) -> Want
     given = wanted(time)
     try:
         goal = Wanted(*map(float, given))
-    except Exception:  # whatever somebody's __float__ does
+    except Exception:  # a user's __float__ may do anything
         goal = None
     if goal is None or any(map(isinf, goal)):
         raise BadValueError(

@@ -256,7 +256,7 @@ def source_of(trial: Logged) -> Source:
 
 
 def _notes(logged: Sequence[Logged], numbers: Sequence[Number], work: Fitted) -> Iterator[str]:
-    """Give what else to know."""
+    """Yield further remarks."""
     for trial in logged:
         yield from trial.notes
     if len(logged) == 1:

@@ -207,7 +207,7 @@ def simulate(
         kept: results to keep, and where.
         check: run it once more with half the steps and half the segment length, and say what changes.
         outputs: which files are made, and how.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.cli import write_results
     from subzero.results.netcdf_csv import open_output_folder
@@ -255,7 +255,7 @@ def compare(
         kept: results to keep, and where.
         check: run both once more with half the steps and half the segment length, and say what changes.
         outputs: which files are made, and how.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.cli import write_results
     from subzero.records.record import read_record
@@ -302,7 +302,7 @@ def plot(
         what: tension, shape3d, motion, forces, attitude, cable; or channels, such as heading. Without it, all six.
         out: folder for the figures; by default the folder of the run.
         format: of the files.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.files.atomic_output import open_output_folder
 
@@ -334,7 +334,7 @@ def explore(
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         port: of the page's address, http://127.0.0.1:PORT; 0 is any that is free.
         no_browser: say the address, and open no browser.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.cli.interrupts import set_exit_message
     from subzero.explore import page as explore_page

@@ -94,7 +94,7 @@ def manoeuvre(
         planes: size of a manoeuvre with the stern-planes, in degrees.
         speed: of the bare hull before it, in m/s.
         out: folder for the files; by default one named after the manoeuvre, here.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     trial = scenarios.load(scenario)  # a mistake in it answers at once
     from subzero.autopilot.manoeuvres import MANOEUVRES
@@ -120,7 +120,7 @@ def fly_step(
     out: Path | None = None,
     output_mode: StrictOutputMode = NOT_STRICT,
 ) -> int:
-    """Let an autopilot follow a step, with the cable and without, and measure it.
+    """Fly a step with an autopilot, with the cable and without, and measure it.
 
     Args:
         name: heading_step, depth_step or speed_step.
@@ -129,7 +129,7 @@ def fly_step(
         size: of the step, in degrees, m or m/s.
         speed: to hold, in m/s.
         out: folder for the files; by default one named after the step, here.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     trial = scenarios.load(scenario)  # a mistake in it answers at once
     from subzero.autopilot.steps import step as run

@@ -101,7 +101,7 @@ def diagnose(
         effects: Python file with causes of your own (EFFECTS = [...]), besides the catalogue.
         commands: whose commands hold if the record and the scenario differ.
         search: how it is searched.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.results.netcdf_csv import open_output_folder
 
@@ -146,7 +146,7 @@ def calibrate(
         out: file of the calibrated vehicle; figures and a JSON file are written next to it.
         commands: whose commands hold if the record and the scenario differ.
         estimation: settings of the estimation.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.calibration.numbers import full_name
     from subzero.cli.write_calibration import files_of, print_calibration, write_all
@@ -182,7 +182,7 @@ def challenge(
         seed: draws the effect, its size, and every number within its tolerance.
         out: folder for the record.
         reveal: folder of a challenge, to show the effect hidden in it.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     if reveal is not None:
         from subzero.synthetic.sealed_answer import reveal as reported

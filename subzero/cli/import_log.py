@@ -42,7 +42,7 @@ def import_(
         out: the record; its map goes there too, as NAME.map.toml. With several logs a folder, for one record of each.
         map_out: write the map to this file, and no record: to edit it, and give it again with --map.
         merge: the logs are of one trial: align their clocks by the channels that they share, and make one record.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.logs.align import merged
     from subzero.logs.api import import_log, undecided

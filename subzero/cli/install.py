@@ -61,7 +61,7 @@ def doctor(*, output_mode: OutputMode = PLAIN) -> int:
     of a run. If one is off, the exit code is 3.
 
     Args:
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.cli.progress import progress_bar
 
@@ -86,7 +86,7 @@ def warm(*, output_mode: OutputMode = PLAIN) -> int:
     """Compile what a comparison such as "subzero compare fig6" uses, once, so that later commands start at once.
 
     Args:
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     import warnings
 

@@ -48,7 +48,7 @@ def watch() -> None:
 
 @contextmanager
 def patience(seconds: float) -> Iterator[None]:
-    """Give a command so long after a signal to write what it has [s]; a second signal ends it at once."""
+    """Set the time that a command has after a signal to write its results [s]; a second signal ends it at once."""
     before, _patience[0] = _patience[0], seconds
     try:
         yield
@@ -86,7 +86,7 @@ def set_exit_message(message: Callable[[], str]) -> None:
 
 
 def print_interrupted(words: str = "") -> None:
-    """Say the last words of an interrupted command, once: by default what became of its files."""
+    """Print the last words of an interrupted command, once: by default the state of its files."""
     if _last_words.acquire(blocking=False):
         with suppress(OSError, ValueError):  # nothing reads standard error any more
             print(words or f"Interrupted; {_state()}.", file=sys.stderr, flush=True)
@@ -123,7 +123,7 @@ def _end_late(woken: socket.socket, waker: socket.socket) -> None:
 
 
 def _say_in_time(say: Callable[[], None]) -> None:
-    """Say something in a thread that is left behind if nothing reads it."""
+    """Print something in a thread that is abandoned if nothing reads it."""
     saying = threading.Thread(target=say, daemon=True)
     saying.start()
     saying.join(LAST_WORDS_S)

@@ -21,7 +21,7 @@ COMMAND: ContextVar[str] = ContextVar("COMMAND", default="")
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class OutputMode:
-    """How the command speaks.
+    """The form of a command's output.
 
     Attributes:
         as_json: print the result as one JSON object, and nothing else, on standard output.

@@ -45,7 +45,7 @@ def sweep(
         workers: processes on this machine; by default one for each of its cores.
         scheduler: address of a Dask scheduler, such as tcp://host:8786, to run on its workers instead.
         retry: run members again that failed.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     if workers is not None and scheduler is not None:
         raise UserError("--workers are processes here, and --scheduler has its own. Leave out one of them.")

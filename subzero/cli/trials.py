@@ -35,7 +35,7 @@ def list_shipped(*, vehicles: Flag = False, cables: Flag = False, output_mode: O
     Args:
         vehicles: list the vehicles.
         cables: list the cables.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from scenarios.contents import first_line
     from scenarios.files import shipped
@@ -58,7 +58,7 @@ def new(path: Path, /, *, like: str = "fig6", output_mode: OutputMode = PLAIN) -
     Args:
         path: file to make, such as my_trial.toml; one that exists is left alone.
         like: what to copy: a name of "subzero list", "subzero list --vehicles" or "subzero list --cables".
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from scenarios.contents import locate
     from subzero.files.read_file import make_toml
@@ -85,7 +85,7 @@ def show(name: str, /, *, output_mode: OutputMode = PLAIN) -> int:
 
     Args:
         name: a shipped name (see "subzero list"), or the path of a TOML file.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from scenarios.contents import contents
 
@@ -106,7 +106,7 @@ def validate(path: Path, /, *, output_mode: OutputMode = PLAIN) -> int:
 
     Args:
         path: the file. All its problems are reported at once, each with its line and the allowed values.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     kind, reported = _record(path) if path.suffix == ".csv" else _toml(path)
     with output_mode.emit({"path": printable(str(path)), "kind": kind, "valid": True, "about": reported}):

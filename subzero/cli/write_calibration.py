@@ -131,7 +131,7 @@ def headline(found: Calibration) -> str:
 
 
 def story(found: Calibration) -> Iterator[str]:
-    """Give the lines that belong below the table; where nothing came near, why, and what to do."""
+    """Yield the lines that belong below the table; where nothing came near, the reason and the remedy."""
     if found.refused:
         yield from (*found.refused[:MOST_TOLD], REMEDY, *found.notes)
         return

@@ -103,7 +103,7 @@ def print_diagnosis(
         output_folder: where the files are.
         console: where to print.
         scenario: the trial as the user named it, a name or a path, for lines of the shell.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     with output_mode.emit(json_file.mapping(verdict) | output_folder.files()):
         _print(verdict, output_folder, console or Console(), scenario)

@@ -130,7 +130,7 @@ class Pace:
     """How many rows compiled code fills at a time, from one on to as many as it fills within `BREATH_S`.
 
     Attributes:
-        rows: how many; measured anew each time that it is entered and left.
+        rows: how many; measured again each time that it is entered and left.
     """
 
     def __init__(self) -> None:

@@ -93,7 +93,7 @@ class _HandleType(types.StructRef):
     """What compiled code takes a handle for."""
 
     def preprocess_fields(self, fields: Any) -> Any:
-        """Let fields have no literal types."""
+        """Declare that fields have no literal types."""
         return tuple((name, types.unliteral(kind)) for name, kind in fields)
 
 
@@ -148,7 +148,7 @@ def advance(
     starboard: float,
     seen: np.ndarray,
 ) -> int:
-    """Take some exchanges under one command, from a row that is written anew with that command.
+    """Take some exchanges under one command, from a row that is written again with that command.
 
     Args:
         handle: the run; its orders have one row.

@@ -266,7 +266,7 @@ class Exploration:
         return last
 
     def answers(self, values: Values, progress: Progress = lambda fraction: None) -> Iterator[Answer]:
-        """Give a rough answer at once, and then that of `answer`, behind whatever refinement it takes.
+        """Yield a rough answer at once, and then that of `answer`, after any refinement it takes.
 
         The rough one is the run without refinement; where that takes longer than `ATTEMPT_S`, of the trial's first
         seconds.
@@ -422,7 +422,7 @@ def _set_change(document: Any, name: str, value: float) -> None:
 
 
 def _lead_from(document: Any, old: Path, new: Path) -> None:
-    """Let the paths in a scenario file lead from another folder to the same files."""
+    """Make the paths in a scenario file lead from another folder to the same files."""
     places = [(document, "vehicle"), (document, "cable")]
     places += [(document[section], "file") for section in ("commands", "motion") if section in document]
     for table, key in places:

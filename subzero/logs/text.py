@@ -293,7 +293,7 @@ def _joined(path: Path, name: str, parts: list[Column], values: np.ndarray | Non
 
 
 def _with_hemispheres(columns: dict[str, Column]) -> list[str]:
-    """Give latitudes and longitudes the signs of the letters in the column behind them, and say so."""
+    """Give latitudes and longitudes the signs of the letters in the column after them, and note it."""
     notes = []
     for name, letters in itertools.pairwise(columns):
         if columns[letters].form != HEMISPHERE:

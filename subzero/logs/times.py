@@ -185,7 +185,7 @@ def problem_of(time: np.ndarray, begins: Sequence[int], stride: int = 1) -> tupl
 
     Args:
         time: of the rows. [s]
-        begins: rows in which the clock begins anew, `parts_of`.
+        begins: rows in which the clock begins again, `parts_of`.
         stride: of so many rows of the log one is here.
     """
     steps = np.diff(time)

@@ -138,7 +138,7 @@ def finished(
     progress: Progress | None = None,
     retry: bool = False,
 ) -> Iterator[Store]:
-    """Give the store of a sweep with all its members finished; what a former call has finished is not run again.
+    """Yield the store of a sweep with all its members finished; members finished by a former call are not run again.
 
     Args:
         plan: the sweep.
@@ -216,7 +216,7 @@ def deliver(plan: Plan, store: Store, folder: Path) -> Gathered:
 
 @contextmanager
 def _executor(workers: Any, members: int) -> Iterator[tuple[Executor, int]]:
-    """Give what runs members, and how many it runs at a time."""
+    """Yield the executor of the members, and the number that it runs at a time."""
     if isinstance(workers, Executor):
         yield workers, workers.count if isinstance(workers, WorkerPool) else cores()
     elif _is_client(workers):

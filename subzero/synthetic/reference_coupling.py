@@ -128,7 +128,7 @@ def _exchange(setup: Setup, live: Live, rope: Rope, led: Led, start: float, span
 
 @compiled
 def _learn(M: np.ndarray, gap: np.ndarray, before: np.ndarray, step: np.ndarray) -> None:
-    """Let M fit the last step, gap − before = −M step, and change it no more than that takes."""
+    """Update M so that it fits the last step, gap − before = −M step, with the smallest change of M."""
     square = step[0] * step[0] + step[1] * step[1] + step[2] * step[2]
     for i in range(3):
         error = before[i] - gap[i]
