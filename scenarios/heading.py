@@ -65,7 +65,7 @@ def expected(
 
 
 def continuous(heading: np.ndarray, like: np.ndarray | None = None, turn: float = TURN) -> np.ndarray:
-    """Return a heading without jumps of whole turns; gaps and what cannot be believed keep their places.
+    """Return a heading without jumps of whole turns; gaps and implausible samples keep their places.
 
     Args:
         heading: as it was measured, NaN in gaps (n,).

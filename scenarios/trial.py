@@ -177,7 +177,7 @@ class Profile:
 
 @dataclass(frozen=True, kw_only=True)
 class Winch:
-    """What turns the drum, linear between the times; after the last one the last value holds.
+    """The winch that turns the drum, linear between the times; after the last one the last value holds.
 
     Attributes:
         control: one of `CONTROLS`.

@@ -172,7 +172,7 @@ def _takes(function: Any, arguments: Collection[Any]) -> bool:
 
 
 def _words(hint: Any) -> str:
-    """Return what an annotation asks for, in words."""
+    """Return the kind that an annotation asks for, in words."""
     kind, inside = typing.get_origin(hint) or hint, typing.get_args(hint)
     if kind in (typing.Union, UnionType):
         return " or ".join(dict.fromkeys(map(_words, inside)))

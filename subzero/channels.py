@@ -191,7 +191,7 @@ class AnyRun(Protocol):
 
 
 class Observation(NamedTuple):
-    """What is true at one time, by the names of `CHANNELS`, in SI units, radians and rev/s.
+    """The true values at one time, by the names of `CHANNELS`, in SI units, radians and rev/s.
 
     The roll angle is `roll` here, ``roll_angle`` there, where `roll` is a method of xarray. The heading is continuous:
     no jump at a full turn. Forces and moments of the cable are those on the hull, body axes.

@@ -186,7 +186,7 @@ def listed(title: str, problems: list[str]) -> str:
 
 
 def printable(text: str) -> str:
-    """Return a text that any terminal, file and figure can take: what does not print becomes an escape.
+    """Return a text that any terminal, file and figure can take: unprintable characters become escapes.
 
     Control characters could move the cursor or recolour a terminal; bytes of a file name that are not UTF-8 cannot be
     written into a file.

@@ -161,7 +161,7 @@ def load(
 
 
 def _complaints(numbers: Mapping[str, Any]) -> Iterable[Any]:
-    """Return what the vehicle's own equations find wrong with its numbers."""
+    """Return the problems that the vehicle's own equations find with its numbers."""
     try:
         from_mapping(numbers)
     except VehicleError as error:

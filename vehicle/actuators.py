@@ -69,7 +69,7 @@ class Servo(Section):
     lost_command: float = parameter("share of the command that is lost, c; 1: jammed", "1", low=0.0, high=1.0)
 
     def numbers(self) -> ServoNumbers:
-        """Return what the compiled servo needs."""
+        """Return the numbers that the compiled servo needs."""
         return ServoNumbers(*self.values())
 
 

@@ -1,4 +1,4 @@
-"""What a parameter of the vehicle is, and how a set of them is checked.
+"""The parameters of the vehicle, and the checks of a set of them.
 
 Every number of a vehicle is a field of a frozen dataclass, a `Section`, made by `parameter`: it carries its meaning,
 its unit and its hard limits (outside of which the equations make no sense; plausible ranges and provenance live

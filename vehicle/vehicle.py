@@ -98,7 +98,7 @@ class Vehicle:
             raise VehicleError(tuple(problems))
 
     def numbers(self) -> VehicleNumbers:
-        """Return what the compiled equations take, a copy that may be changed.
+        """Return the numbers of the compiled equations, a copy that may be changed.
 
         Raises:
             VehicleError: numbers so large or so small that what follows from them is not finite.
@@ -107,7 +107,8 @@ class Vehicle:
 
     @property
     def own_numbers(self) -> VehicleNumbers:
-        """What the compiled equations take, made once: for what copies it itself, as a record does of another.
+        """The numbers of the compiled equations, made once: for callers that copy it themselves, as a record does of
+        another.
 
         Raises:
             VehicleError: as of `numbers`.

@@ -151,7 +151,7 @@ def arm(near: float, far: float, p: int) -> float:
 def _bend(
     rope: Rope, g: float, j: int, k: int, p: int, factor: float, moment: float, by_length: float
 ) -> None:
-    """Add to node j + p what the bend at node j does along axis k."""
+    """Add to node j + p the force of the bend at node j along axis k."""
     near, far, held = rope.spring[REST, j], rope.spring[REST, j + 1], unknowns(rope)
     if j + p < 1 or j + p > held:
         return

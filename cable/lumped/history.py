@@ -136,7 +136,7 @@ def _run(rope: Rope, course: Course, fixed: Fixed) -> History:
 
 
 def _reason(rope: Rope, journey: Journey) -> str:
-    """Return why a run ended early: when, where, and what to try."""
+    """Return why a run ended early: when, where, and the advice."""
     held, solved = unknowns(rope), journey.solved
     if solved.worst == FULL:
         return (

@@ -51,7 +51,7 @@ class RopeEnds(Record):
         since_loose: steps since cable was last loose; no more are counted than `SMOOTH_STEPS`.
         stage_end: time of a stage from the start of the step. [s]
         payout_rate: d²S/dt² at level OLD. [m/s²]
-        start_last, start_payout: what the stage builds on. [m], [m/s]
+        start_last, start_payout: values that the stage builds on. [m], [m/s]
         drum_place, drum_velocity: of the drum at level NEW (3,). [m], [m/s]
         drum_pull: T(S). [N]
         tow_force: on the vehicle, earth axes (3,). [N]

@@ -27,7 +27,8 @@ from cable.properties import CableNumbers
 from subzero.jit import compiled, inlined, inner
 
 LOSS, STORED, GRAVITY_WORK, AT_DRUM, ADDED_MASS, STRAINED, CARRIED, TOWED = range(8)
-"""What `energy_flow` fills: L, E [J], G, D_S, M, −∫T t·∂J/∂s ds, ∫m U·dJ/dt ds (mean over a step), −F·U(0). [W]"""
+"""Entries that `energy_flow` fills: L, E [J], G, D_S, M, −∫T t·∂J/∂s ds, ∫m U·dJ/dt ds (mean over a step), −F·U(0).
+[W]"""
 FLOWS = 8
 
 
@@ -102,7 +103,7 @@ def _flow_at_ends(line: Line, c: CableNumbers, out: np.ndarray) -> None:
 
 @inner
 def book_step(line: Line, step: float, c: CableNumbers, work: Load, ledger: np.ndarray) -> None:
-    """Add an accepted step to a ledger (3, FLOWS): flows before, flows now, and what came in, went out and is missing.
+    """Add an accepted step to a ledger (3, FLOWS): flows before, flows now, and the sums of work, terms and residual.
 
     The third row holds the work of the tow point, the sum of the sizes of all terms, and the residual of the balance
     at TOWED, LOSS and STORED. [J]

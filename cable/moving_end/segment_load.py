@@ -154,7 +154,7 @@ def differentiate_load(slip: float, a0: float, c: CableNumbers, work: Load) -> N
 
 @inlined
 def _differentiate_by_chord(i: int, alpha: float, bent: float, by_t: float, g: float, work: Load) -> None:
-    """Fill row i of ∂q/∂d and of (∂q/∂t) t, of α, U_t k_n U_⊥/|U_⊥| and what stands before I in ∂q/∂t."""
+    """Fill row i of ∂q/∂d and of (∂q/∂t) t, of α, U_t k_n U_⊥/|U_⊥| and the factor of I in ∂q/∂t."""
     V, J, t, across = work.velocity, work.water, work.tangent, work.across
     x, y, z = t[0], t[1], t[2]
     a = alpha * (V[0] - J[0]) - bent * across[0] + (by_t if i == 0 else 0.0)

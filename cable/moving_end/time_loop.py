@@ -315,7 +315,7 @@ def _run(
 
 
 def as_history(path: TowPath, record: Record, rows: int, solved: Solved, trouble: str) -> History:
-    """Return the record's filled rows as a history; `trouble` says what stopped it, if it was stopped."""
+    """Return the record's filled rows as a history; `trouble` is the reason if it was stopped."""
     times, tow, completed = path.times, path.place, rows == path.times.size
     message = "The run reached its end." if completed else trouble
     # Shapes are packed in one array; the cuts are the first nodes of the rows.

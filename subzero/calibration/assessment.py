@@ -320,5 +320,5 @@ def nuisances(work: Fitted, count: int) -> dict[str, tuple[float, float]]:
 
 
 def at_nominal(problem: Problem) -> Problem:
-    """Return the problem without what was added to its simulations."""
+    """Return the problem without the parts that were added to its simulations."""
     return replace(problem, records=tuple(replace(record, correction={}) for record in problem.records))

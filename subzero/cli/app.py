@@ -76,7 +76,7 @@ class Outputs:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Inputs:
-    """What is simulated besides the scenario.
+    """Inputs of the simulation besides the scenario.
 
     Attributes:
         with_: extended model that a diagnosis has written (extended.toml).
@@ -109,7 +109,7 @@ class Inputs:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Kept:
-    """What is kept of it, and where.
+    """Results to keep, and where.
 
     Attributes:
         out: folder for the files; by default one named after the scenario, here.
@@ -411,7 +411,7 @@ def _aloud(output_mode: OutputMode) -> Iterator[None]:
 
 
 def _effort() -> str:
-    """Return what was compiled by this command and where it is kept, as far as it has needed any machine code."""
+    """Return the functions compiled by this command and their folder, as far as it has needed any machine code."""
     if "subzero.jit.machine_code" not in sys.modules:
         return ""
     from subzero.jit.machine_code import base_folder, compiled_functions
@@ -464,7 +464,7 @@ def _unknown_option(error: cyclopts.UnknownOptionError) -> str:
 
 
 def _missing(command: str, argument: cyclopts.Argument) -> str:
-    """Return what a command needs, and how it is called."""
+    """Return the arguments that a command needs, and how it is called."""
     if not argument.required:
         return f"{argument.name} needs a value."
     return (

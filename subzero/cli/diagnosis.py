@@ -66,7 +66,7 @@ FULL_SEARCH = Search()
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Estimation:
-    """What is estimated.
+    """Settings of the estimation.
 
     Attributes:
         free: numbers to estimate, such as rudder.lift_slope; by default the twelve that records usually determine.
@@ -141,7 +141,8 @@ def calibrate(
 
     Args:
         records: CSV files of one vehicle, or folders of them; several manoeuvres say more than one.
-        scenario: what was flown: a name (see "subzero list") or a path; a record's sidecar may name another.
+        scenario: the scenario that was flown: a name (see "subzero list") or a path; a record's sidecar may name
+            another.
         vehicle: name or file of the vehicle to begin with, instead of the scenario's.
         out: file of the calibrated vehicle; figures and a JSON file are written next to it.
         commands: whose commands hold if the record and the scenario differ.

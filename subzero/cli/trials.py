@@ -57,7 +57,7 @@ def new(path: Path, /, *, like: str = "fig6", output_mode: OutputMode = PLAIN) -
 
     Args:
         path: file to make, such as my_trial.toml; one that exists is left alone.
-        like: what to copy: a name of "subzero list", "subzero list --vehicles" or "subzero list --cables".
+        like: the file to copy: a name of "subzero list", "subzero list --vehicles" or "subzero list --cables".
         output_mode: the form of the output.
     """
     from scenarios.contents import locate

@@ -364,7 +364,7 @@ CLOSE = 1e-6
 def rows_of_changes(
     trial: scenarios.Trial, tethered: bool, times: np.ndarray, later: Later
 ) -> dict[int, Model]:
-    """Return the rows from which on other models hold; refuse what cannot be done.
+    """Return the rows from which on other models hold; raise an error for changes that are not possible.
 
     Raises:
         UserError: a scheme that cannot change, or a time that is none of the run's.

@@ -118,7 +118,7 @@ async def _refuse(scope: Message, send: Send, status: int, words: str) -> None:
 
 
 def _with(headers: tuple[tuple[bytes, bytes], ...], send: Send) -> Send:
-    """Return what sends an answer with headers added."""
+    """Return a function that sends an answer with headers added."""
 
     async def sent(message: Message) -> None:
         if message["type"] == "http.response.start":

@@ -43,7 +43,7 @@ class UnreadableFileError(UserError):
 
     Attributes:
         why: the problem with it, the end of a sentence.
-        remedy: what to do, a sentence.
+        remedy: the remedy, a sentence.
         is_missing: there is none.
     """
 

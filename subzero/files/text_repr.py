@@ -57,6 +57,6 @@ class Overview(NamedTuple):
 
 
 def cut(text: str) -> str:
-    """Return a text on one line, without what a terminal would obey, at most `MOST_LETTERS` letters."""
+    """Return a text on one line, without control characters of a terminal, at most `MOST_LETTERS` letters."""
     line = printable(" ".join(text.split()))
     return line if len(line) <= MOST_LETTERS else f"{line[: MOST_LETTERS - 1]}…"

@@ -1,4 +1,4 @@
-"""What the values of a log say of the units of its columns, taken together.
+"""The evidence that the values of a log give for the units of its columns, taken together.
 
 Measurements of one vehicle are tied to one another. Over windows of rows, with a bar for the mean in a window,
 

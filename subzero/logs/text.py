@@ -43,7 +43,7 @@ GAPS = frozenset(
 HEMISPHERE, SIGNS = "hemisphere", {"N": 1.0, "E": 1.0, "S": -1.0, "W": -1.0}
 """Form of letters after latitudes and longitudes, and their signs."""
 HEAD, LONGEST_LINE, CHUNK = 1 << 16, 1 << 20, 20_000
-"""What is looked at first [byte], the longest line [character], and rows that are converted at once."""
+"""The size of the first look [byte], the longest line [character], and rows that are converted at once."""
 SAMPLE = 100
 """Number of lines that determine delimiter, decimal sign and header."""
 MOST_ROWS = 1_000_000

@@ -204,7 +204,7 @@ class Simulator:
         )
 
     def _command_at(self, time: float) -> tuple[float, float, float, float]:
-        """Return what the scenario commands at a time [s]."""
+        """Return the command of the scenario at a time [s]."""
         commands = self.trial.commands
         if commands is None:
             return 0.0, 0.0, 0.0, 0.0

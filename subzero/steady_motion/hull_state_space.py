@@ -130,7 +130,7 @@ def rate(
 
 
 class Demand(NamedTuple):
-    """What an actuator has to do, and the most it can: its name, both values, their unit for a message."""
+    """The demand on an actuator, and the most it can do: its name, both values, their unit for a message."""
 
     name: str
     value: float
@@ -164,7 +164,7 @@ def ideal(hull: Vehicle) -> Vehicle:
 
 
 def demands(hull: Vehicle, x: np.ndarray) -> list[Demand]:
-    """Return what a state (16,) asks of each actuator."""
+    """Return the demands of a state (16,) on each actuator."""
     propeller = Demand("propeller", abs(float(x[12])), fastest_propeller(hull, float(x[SURGE])), "rev/s")
     fins = zip(("rudder", "port stern-plane", "starboard stern-plane"), x[13:], servos(hull), strict=True)
     return [propeller] + [_fin_demand(name, float(angle), servo) for name, angle, servo in fins]

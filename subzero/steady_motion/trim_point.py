@@ -89,7 +89,7 @@ class SteadyPull:
 
 
 RESIDUAL = 1e-9
-"""What may be left of accelerations and depth rate. [m/s2, rad/s2, m/s]"""
+"""Tolerances of accelerations and depth rate. [m/s2, rad/s2, m/s]"""
 FARTHEST = 1.2
 """Fin and pitch angles beyond this are another balance than the one that is looked for. [rad]"""
 
@@ -156,7 +156,7 @@ class Asked:
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """What is asked for, of which hull (its numbers without limits), with which pull beyond the formula's."""
+    """The requested motion, of which hull (its numbers without limits), with which pull beyond the formula's."""
 
     asked: Asked
     numbers: VehicleNumbers
@@ -279,7 +279,7 @@ def steady_motion(model: Model, asked: Asked, pull_of: Pull | None = None) -> Tr
     Args:
         model: vehicle and cable.
         asked: which motion.
-        pull_of: what the cable pulls in it, if not what the formula says.
+        pull_of: the pull of the cable in it, if not that of the formula.
 
     Raises:
         NoTrimError: there is none: which limit is hit, and how far one can go.

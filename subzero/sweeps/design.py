@@ -38,7 +38,7 @@ DISTRIBUTION_KEYS = ("values", "from", "to", "count", "log", "normal")
 
 @dataclass(frozen=True, kw_only=True)
 class Spread:
-    """What values a parameter takes.
+    """The distribution of the values of a parameter.
 
     Attributes:
         name: of the parameter, dotted.
@@ -344,7 +344,7 @@ def _saltelli(spreads: tuple[Spread, ...], samples: int, seed: int) -> Made:
 
 
 def salib_problem(spreads: tuple[Spread, ...]) -> dict[str, Any]:
-    """Return what SALib takes: the unit cube, so that any distribution serves."""
+    """Return the problem in SALib's form: the unit cube, so that any distribution serves."""
     names = [spread.name for spread in spreads]
     return {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
 

@@ -102,7 +102,7 @@ def what_matters(summary: Summary) -> Table:
 
 
 def warning_lines(summary: Summary) -> list[str]:
-    """Return what members' runs warn of."""
+    """Return the warnings of members' runs."""
     return [
         f"{count} of {summary['members']} members' runs warn of {check.replace('_', ' ')}."
         for check, count in summary["warnings"].items()
@@ -110,7 +110,7 @@ def warning_lines(summary: Summary) -> list[str]:
 
 
 def _effects(summary: Summary, scalar: str) -> list[Summary]:
-    """Return what moves a scalar, the greatest first."""
+    """Return the parameters that move a scalar, the one of greatest effect first."""
     return [row for row in summary["sensitivity"]["effects"] if row["scalar"] == scalar]
 
 

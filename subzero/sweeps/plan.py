@@ -62,7 +62,7 @@ class Plan:
     """A sweep, checked.
 
     Attributes:
-        job: what a worker needs.
+        job: the data that a worker needs.
         points: which members there are.
         description: one line.
         text: of the file that says so; empty without one.
@@ -86,7 +86,7 @@ class Plan:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """What a dataset says of where it is from; no clock, so that two are alike to the last bit."""
+        """The provenance attributes of a dataset; no clock, so that two are alike to the last bit."""
         return {
             "title": self.description,
             "scenario": self.job.trial.name,

@@ -1,4 +1,4 @@
-"""What matters: how much each parameter moves each scalar, by the method that the design of the sweep allows.
+"""Sensitivity: how much each parameter moves each scalar, by the method that the design of the sweep allows.
 
 morris        mu_star, the mean size of its elementary effects, and their deviation sigma (Morris 1991, Campolongo 2007)
 saltelli      Sobol indices, its share of the variance alone (first order) and with all others (total)  (Saltelli 2010)
@@ -49,7 +49,7 @@ CORRELATION = ("Spearman's rank correlation", "correlation", "")
 
 
 def description_of(design: str) -> tuple[str, str, str]:
-    """Return what a design's sensitivity is called, and its two numbers."""
+    """Return the name of a design's sensitivity, and its two numbers."""
     return METHODS.get(design, CORRELATION)
 
 

@@ -1,4 +1,4 @@
-"""The file that keeps what members gave: SQLite, so that a kill at any moment costs at most what was not written yet.
+"""The file that keeps members' results: SQLite, so that a kill at any moment costs at most those not written yet.
 
 Members come in batches, each in one transaction: it is in the file as a whole, or not at all. A member's number is the
 key of its row, so none can be in it twice. The file of a sweep that is running is locked; another command with it is
@@ -158,7 +158,7 @@ def opened(folder: Path, manifest: Mapping[str, str], shape: tuple[int, int]) ->
 
     Args:
         folder: where it is, or will be.
-        manifest: what the members belong to: what → its digest or text.
+        manifest: the settings that the members belong to: name → its digest or text.
         shape: channels and times of a member.
 
     Raises:

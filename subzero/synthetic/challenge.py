@@ -33,7 +33,7 @@ BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 SAMPLE_S = 0.1
 """Time between samples. [s]"""
 KIND_PROBABILITIES = {"none": 0.2, "single": 0.4, "sudden": 0.1, "pair": 0.15, "outside": 0.15}
-"""What is hidden, how often."""
+"""Kind of hidden effect → its probability."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +79,7 @@ def challenge(
         scenario: the scenario to fly.
         seed: draws everything.
         folder: for ``record.csv``, ``record.toml`` and the sealed answer.
-        kind: what to hide, one of KIND_PROBABILITIES; drawn if None.
+        kind: the kind of effect to hide, one of KIND_PROBABILITIES; drawn if None.
         spread: of the true numbers, in tolerances.
 
     Raises:

@@ -1,4 +1,5 @@
-"""What is planted in a record: deviations within tolerance, effects on top of them; and the record as sensors write it.
+"""Effects planted in a record: deviations within tolerance, effects on top of them; and the record as sensors write
+it.
 
 The truth comes from the other cable formulation (`reference_run`); noise is AR(1), with outliers, rounding and gaps.
 """
@@ -122,7 +123,7 @@ OUTLIER = (8.0, 25.0)
 
 @dataclass(frozen=True, kw_only=True)
 class SensorErrors:
-    """What sensors and their logger do to a true value.
+    """The errors that sensors and their logger add to a true value.
 
     Attributes:
         noise: channel → standard deviation in its display unit, or a factor on that of usual sensors.
@@ -171,7 +172,7 @@ def make_record(
         channels: names of `subzero.channels`.
         seed: of the noise.
         errors: noise, outliers and gaps.
-        simulate: what gives the truth.
+        simulate: the function that gives the truth.
         source: of the record, in words.
     """
     rng, channels = np.random.default_rng(seed), tuple(channels)

@@ -38,7 +38,7 @@ class Led(NamedTuple):
 
     Attributes:
         ends: place and velocity, relative to the drum, at start and end (2, 6). [m], [m/s]
-        legs: what `cable.lumped.step` is led by (2, 15).
+        legs: inputs of the ends for `cable.lumped.step` (2, 15).
         matrix: I − ∂F_cable/∂F (3, 3).
         states: of the springs at the start of an exchange.
         history: pull of the cable, earth axes, its tension at the drum and its length, by rows (n, 5). [N], [m]

@@ -1,4 +1,4 @@
-"""The truth of a setting by the other cable formulation, lumped masses and springs, and what sensors show of it.
+"""The truth of a setting by the other cable formulation, lumped masses and springs, and the readings of its sensors.
 
 Another cable (`cable.lumped`), another way to couple it (`reference_coupling`), finer steps, and sensors written
 independently of `hypothesis.configuration`. Only the hull is the same; without the cable it is the hull alone in finer
@@ -127,7 +127,7 @@ class NoTruthError(UserError):
 
 @dataclass(frozen=True, kw_only=True)
 class Truth:
-    """What happened: the run of the hull, and of the cable the pull in earth axes (n, 3), drum tension, length (n,)."""
+    """The truth: the run of the hull, and of the cable the pull in earth axes (n, 3), drum tension, length (n,)."""
 
     run: Run
     pull: np.ndarray
@@ -144,7 +144,7 @@ def simulate_reference(
     segment_length: float = 0.25,
     hull_step: float = 0.01,
 ) -> dict[str, np.ndarray]:
-    """Return what the sensors of a setting would show, without noise, by the other formulation.
+    """Return the readings of the sensors of a setting, without noise, by the other formulation.
 
     Args:
         setting: of the trial.

@@ -34,7 +34,7 @@ class Answer:
         starts: effect id → when it begins. [s]
         axis, feature: of a force that is not in the catalogue.
         tolerances: effect id → deviations that were drawn within the tolerances.
-        scenario, seed: what was asked for.
+        scenario, seed: the arguments of the challenge.
     """
 
     kind: str

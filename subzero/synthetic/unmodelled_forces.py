@@ -24,7 +24,7 @@ class UnmodelledForce:
 
     Attributes:
         name: of its kind.
-        sentence: what happened.
+        sentence: its description.
         axis: where it acts, at most.
         feature: of its formula, "" for one that is a function of time alone.
         missing: the force.
@@ -50,7 +50,7 @@ class UnmodelledForce:
 
 
 def force_along(outside: UnmodelledForce, setting: Setting, truth: Truth) -> np.ndarray:
-    """Return the force (n, 6) at the times of a truth of the setting: what a diagnosis should recover. [N, N m]"""
+    """Return the force (n, 6) at the times of a truth of the setting, which a diagnosis should recover. [N, N m]"""
     times, factors = truth.run.times, factors_of(setting, truth)
     total = history_at(outside.missing, times)
     for term in outside.missing.terms:
@@ -85,7 +85,7 @@ HISTORY_STEP_S = 0.1
 
 @dataclass(frozen=True)
 class Draw:
-    """What a kind draws from: a generator, duration of the trial [s], drag of the hull at 1 m/s [N], its length [m]."""
+    """The inputs of a draw: a generator, duration of the trial [s], drag of the hull at 1 m/s [N], its length [m]."""
 
     rng: np.random.Generator
     duration: float

@@ -1,4 +1,4 @@
-"""What may be wrong with a run that has reached its end: `CHECKS`, each a pure function of the labelled result.
+"""Warnings about a run that has reached its end: `CHECKS`, each a pure function of the labelled result.
 
 A check takes a run, its trial and its model, and answers with sentences, none if all is well. A sentence says what, how
 much, since when, and what to do. They stand in ``attrs["warnings"]`` of the run (`warnings_of` reads them), in

@@ -113,7 +113,9 @@ def resolution(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
 
 
 def _start_imbalance(run: AnyRun, trial: scenarios.Trial, model: Model) -> str:
-    """Return what moves or pulls at time 0 of a run, where a cable at rest is laid: ": the water by 0.3 m/s, …"."""
+    """Return the motions and forces at time 0 of a run, where a cable at rest is laid: ": the water by 0.3 m/s,
+    …".
+    """
     winch, vessel = model.winch, model.vessel
     flow = model.water().at((0.0, 0.0, trial.start.depth))
     speeds = {  # a cable that hangs is at rest in the current, one that is laid straight is not
