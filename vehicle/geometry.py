@@ -152,8 +152,7 @@ def lateral_added_mass(hull: Hull, density: float) -> tuple[float, float, float]
 
 
 def fin_added_mass(hull: Hull, density: float, station: float, chord: float, tip: float) -> tuple[float, ...]:
-    """Return the contributions of a pair of fins to A22 [kg], A26 [kg m], A66 [kg m2], and of four of them to A44 [kg
-    m2].
+    """Return the parts of a pair of fins in A22 [kg], A26 [kg m], A66 [kg m2], and of four of them in A44 [kg m2].
 
     A slice of hull radius R with a pair of fins up to the radius a_f moves πρ(a_f² − R² + R⁴/a_f²) sideways
     (Blevins, in Prestero 2001), where the bare hull has πρR²; four fins add (2/π)ρ a_f⁴ about the axis.
