@@ -65,6 +65,7 @@ def _pull_straight(
     line: Line, wet_length: float, direction: np.ndarray, tow: np.ndarray, drum: DrumNumbers, c: CableNumbers
 ) -> None:
     """Fill places, velocities (even between both ends) and tensions of a straight cable that moves along itself."""
+    # A straight cable that moves along itself has the drag of its speed along itself only.
     speed = tow[0] * direction[0] + tow[1] * direction[1] + tow[2] * direction[2]
     per_metre, along = c.tangential_drag * speed * abs(speed), wet_length
     for j in range(line.ends.count + 1):

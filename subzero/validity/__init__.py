@@ -88,6 +88,7 @@ def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -
     # A finer run settles neither a run that stopped nor a start that finer runs have contradicted.
     if run.attrs["outcome"] != "completed" or starts_otherwise(run):
         return 0
+    # Without a doubt, finer runs are needed in the two cases only that are not doubts yet.
     if not {warning.check for warning in warnings_of(run)}.intersection(DOUBTS):
         return PROOF if only_just_fits(run) or is_left_open(run, trial, model) else 0
     for finer in sorted({PROOF, DRUM_PROOF}):
