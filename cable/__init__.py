@@ -1,4 +1,4 @@
-"""The cable: a thin, flexible, growing line in water, pulled off a drum; it knows no vehicle.
+"""The cable: a thin, flexible, growing line in water, pulled off a drum; it is independent of any vehicle.
 
 Everything is SI, earth axes are north, east, down, positions are relative to the drum. The arc length s runs from
 the tow point to the drum, the tangent t points that way, so V_t is negative while cable is pulled out.
@@ -23,7 +23,7 @@ What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`pr
 nothing else:
 
 * `moving_end`, the default: balances are vectors (their equivalence with the paper's six scalar equations, whose signs
-  are derived anew, is in `feng_allen.equation7` and tested), time is differenced backward, and a step is solved by
+  are derived again, is in `feng_allen.equation7` and tested), time is differenced backward, and a step is solved by
   Newton's method on a block tridiagonal system.
 * `lumped`: masses and stiff springs, another time scheme.
 * `feng_allen`: the paper's angles, in its own scheme (20)-(26) as printed, and in a box scheme of second order.

@@ -34,7 +34,7 @@ class Water(NamedTuple):
 
     Attributes:
         points: where the cable's positions are zero on the grid's axes (3 numbers), how many points the axes time,
-            north, east and down have (4), and these points, one axis behind another. [m], [s]
+            north, east and down have (4), and these points, one axis after another. [m], [s]
         velocity: north, east, down at the grid points, down running fastest (points of the grid, 3). [m/s]
     """
 
@@ -63,7 +63,7 @@ class Current:
     time: np.ndarray = field(default_factory=lambda: np.zeros(1))
 
     def __post_init__(self) -> None:
-        """Refuse what is no grid."""
+        """Raise an error if the fields do not form a grid."""
         for name in ("time", "north", "east", "down"):
             points = np.atleast_1d(_numbers(name, getattr(self, name)))
             if points.ndim != 1 or points.size == 0 or not (np.diff(points) > 0.0).all():
@@ -150,7 +150,7 @@ def _numbers(name: str, values: Any) -> np.ndarray:
 
 
 def _three(name: str, values: Any) -> np.ndarray:
-    """Return three finite numbers as an array, or refuse what is none."""
+    """Return three finite numbers as an array; raise an error for anything else."""
     numbers = _numbers(name, values)
     if numbers.shape != (3,):
         raise BadValueError(f"{name} must be three finite numbers (north, east, down); got {short(values)}.")

@@ -1,6 +1,6 @@
-"""Why the numbers of a cable may be wrong: what each says of a run, a trial with a vehicle uses alike.
+"""Reasons why the numbers of a cable may be wrong; runs of a cable alone and trials with a vehicle share them.
 
-    energy      what is missing in the balance of work and losses, as a share of them
+    energy      residual of the balance of work and losses, as a share of them
     roughness   |F(t−h) − 2F(t) + F(t+h)| / max |F|: a tow force that jumps from sample to sample is not resolved
     slack       cable that is longer than the way between its nodes, or pulls at neither end of a segment
     surface     cable above down = 0 and above its ends: in the air, if down is depth
@@ -17,7 +17,7 @@ import numpy as np
 RESIDUAL = 0.01
 """A residual above this share of the largest energy of the run is too much. [-]"""
 NO_FORCE = 1e-6
-"""A smaller force is none. [N]"""
+"""A smaller force counts as zero. [N]"""
 ROUGH = 0.03
 """A tow force whose second difference from sample to sample exceeds this share of the largest force is not resolved by
 the steps. Of 160 trials of `benchmarks.trust` all 117 that were wrong by more than 3 % had more, and none of the 13
@@ -27,7 +27,7 @@ LIMP = 1e-6
 SLACK_SHARE = 0.05
 """Slack is warned of from this share of the length on. [-]"""
 ROUNDING = 1e-6
-"""What is beyond surface or bed by less than this is at it. [m]"""
+"""A point beyond surface or bed by less than this is at it. [m]"""
 FOLDED = 1e-3
 """A cable whose segments are shorter than their cable by more than this share is folded somewhere. [-]"""
 
@@ -50,7 +50,7 @@ def slack_share(length: np.ndarray, chord: np.ndarray, tension: np.ndarray) -> n
 
     Args:
         length: of the cable (samples,). [m]
-        chord: distances between neighbouring nodes (samples, nodes − 1), 0 behind the last. [m]
+        chord: distances between neighbouring nodes (samples, nodes − 1), 0 after the last. [m]
         tension: at the nodes (samples, nodes). [N]
     """
     length = np.maximum(length, 1e-9)
@@ -85,7 +85,7 @@ def doubts_of(
     tensions: Sequence[np.ndarray],
     energy_residual: float,
 ) -> tuple[str, ...]:
-    """Return why the numbers of a run may be wrong, in sentences; none if nothing is known against them.
+    """Return why the numbers of a run may be wrong, in sentences; none if no check finds a reason.
 
     Args:
         time: of the samples (samples,). [s]
@@ -93,7 +93,7 @@ def doubts_of(
         length: of the cable (samples,). [m]
         shapes: node positions, an array (nodes, 3) a sample. [m]
         tensions: at the nodes, an array (nodes,) a sample. [N]
-        energy_residual: what is missing in the balance of energies; NaN where nothing is booked. [-]
+        energy_residual: residual of the energy balance; NaN where no energies are recorded. [-]
     """
     found = []
     if energy_residual > RESIDUAL:

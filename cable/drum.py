@@ -1,17 +1,17 @@
-"""The drum: what it is, and what it can do: turn with the cable, stand and hold it, or spin ahead of it.
+"""The drum: its properties and its three states: it turns with the cable, is held, or overruns the cable.
 
     turning    T(S) R_d = I_d dΩ/dt + C_f      (11); the cable is taut at the drum
     standing   dS/dt = 0                        it is held; cable is never taken up
-    spinning   0 = I_d dΩ/dt + C_f, T(S) = 0    the drum overruns: its inertia throws cable out ahead of what is pulled
+    spinning   0 = I_d dΩ/dt + C_f, T(S) = 0    the drum overruns: by its inertia it gives more cable than is pulled
 
-What it throws out lies loose before it, outside the water, and gives way to any pull; when it is used up, the cable
-takes the drum along again by a jerk. Beyond the drum the cable is taut, as it would be from a drum without inertia: an
-overrun in the water, of a whole segment, would take its drag from the tow force, and a fit from jump to jump.
+The extra cable lies loose in front of the drum, outside the water, and does not resist any pull; when it is used up,
+the cable takes the drum along again with a jerk. Beyond the drum the cable is taut, as with a drum without inertia:
+an overrun in the water, of a whole segment, would take its drag from the tow force, and a fit from jump to jump.
 
 Coulomb friction is rounded off at rest: C_f U/√(U² + U_c²) with the pay-out rate U and U_c = 1 mm/s (`CREEP`). A drum
-that friction holds therefore creeps by less than that, and a taut cable always has an answer. One that has stood stays
-so until it is pulled by what friction has at U_c: where a slack cable stirs, an equation that is that steep at rest,
-and flat at any speed, often has no answer that Newton's method finds.
+that friction holds therefore creeps by less than that, and a taut cable always has a solution. A drum that has come
+to rest remains at rest until the pull exceeds the friction at U_c: where a slack cable moves slowly, an equation that
+is so steep at rest, and flat at any speed, often has no solution that Newton's method finds.
 
 A winch instead of the free drum either follows a prescribed length S(t) (a brake: a constant one), or keeps the tension
 T(S) at a prescribed value, paying out and reeling in as needed.
@@ -45,7 +45,7 @@ TINY_SPEED = 1e-12
 MOST_COASTING = 60
 """Most iterations for the speed of a coasting drum."""
 HELD = 1e-12
-"""A tension or pay-out rate below this is none. [N], [m/s]"""
+"""A tension or pay-out rate below this counts as zero. [N], [m/s]"""
 
 
 class DrumNumbers(Record):
@@ -54,8 +54,8 @@ class DrumNumbers(Record):
     Attributes:
         inertia: I_d/R_d². [kg]
         friction: C_f/R_d. [N]
-        control: who decides on the pay-out, `FREE`, `LENGTH` or `TENSION`.
-        setpoint: what is asked for at the new time: length [m] or tension [N]; without meaning for a free drum.
+        control: the quantity that determines the pay-out, `FREE`, `LENGTH` or `TENSION`.
+        setpoint: commanded value at the new time: length [m] or tension [N]; without meaning for a free drum.
         place, velocity: of the drum at the new time, relative to its place at the start (3,). [m], [m/s]
     """
 
@@ -68,7 +68,7 @@ class DrumNumbers(Record):
 
     @classmethod
     def at_rest(cls, *, inertia: float = 0.0, friction: float = 0.0, control: int = FREE) -> DrumNumbers:
-        """Return the numbers of a drum that stands where it stood at the start."""
+        """Return the numbers of a drum that remains where it was at the start."""
         return cls(inertia, friction, control, 0.0, np.zeros(3), np.zeros(3))
 
 
@@ -91,7 +91,7 @@ class DrumProperties:
     friction_torque: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a drum."""
+        """Raise an error if the fields do not describe a possible drum."""
         for name in ("radius", "inertia", "friction_torque"):
             above = 0.0 if name == "radius" else None
             value = checked("DrumProperties", name, getattr(self, name), least=0.0, above=above)
@@ -116,7 +116,7 @@ def next_mode(mode: int, converged: bool, payout: float, loose: float, pull: flo
     problem is ill-posed, and the drum is taken to stand.
 
     Args:
-        mode: what was supposed.
+        mode: the assumed state.
         converged: whether a solution was found with it.
         payout: rate at which the water takes cable in that solution. [m/s]
         loose: length that lies loose before the drum then. [m]

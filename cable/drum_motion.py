@@ -1,4 +1,4 @@
-"""Where a drum goes, and what its winch is asked for: a table over time, cubic (places) and linear in between.
+"""The motion of a drum, and the setpoint of its winch: a table over time, cubic (places) and linear in between.
 
 Columns: time [s], place and velocity of the drum relative to its place at the start, earth axes [m], [m/s], and what a
 winch is asked for, length [m] or tension [N]. One array, for few arguments compile sooner.
@@ -12,7 +12,7 @@ from cable.drum import DrumNumbers
 from subzero.jit import inner
 
 PLACE, VELOCITY, SETPOINT = 1, 4, 7
-"""First columns of what the table holds beside the time."""
+"""First columns of the place, the velocity and the setpoint in the table; column 0 is the time."""
 
 
 def drum_path(
@@ -23,7 +23,7 @@ def drum_path(
 
 
 def resting(times: np.ndarray, setpoints: np.ndarray | None = None) -> np.ndarray:
-    """Return the table of a drum that stays where it is."""
+    """Return the table of a drum that does not move."""
     still = np.zeros((times.size, 3))
     return drum_path(times, still, still, np.zeros(times.size) if setpoints is None else setpoints)
 

@@ -1,4 +1,6 @@
-"""What a cable did, over time or at rest: tensions, forces, lengths and shapes, with units and how the solving went."""
+"""The result of a cable, over time or at rest: tensions, forces, lengths and shapes, with units and the
+convergence.
+"""
 
 from __future__ import annotations
 
@@ -41,13 +43,13 @@ class Outcome:
 
     Attributes:
         completed: the run reached its end.
-        message: what happened, when and where, and what to try; one sentence when all went well.
+        message: the outcome, when and where, and the advice; one sentence when all went well.
         iterations: Newton iterations in all.
         worst_residual: residual left in the last step, as a multiple of its tolerance.
         steps: how many steps were taken, with those that were made smaller than the time between two results.
         largest_courant_number: √(T/m1) Δt/Δs, how many segments a transverse wave crosses in a step, at most.
-        energy_residual: what is missing in the balance of `moving_end.energy`, as a share of the work and the loss in
-            all.
+        energy_residual: residual of the balance of `moving_end.energy`, as a share of the total of the work and the
+            loss.
     """
 
     completed: bool
@@ -72,7 +74,7 @@ class History:
         tow_point: position of the tow point relative to the drum (n, 3). [m]
         shapes: node positions relative to the drum, tow point first, one array (nodes, 3) per time. [m]
         tensions: tensions at the nodes, one array (nodes,) per time. [N]
-        outcome: how the run ended; a stopped run keeps what it has.
+        outcome: how the run ended; a stopped run keeps its results up to then.
         scheme: the scheme that was used.
         tow_impulse: impulse of the cable on the vehicle just after each time, where the tow point changes its
             velocity at once (n, 3), zero elsewhere; the tow forces do not show it (`moving_end.jolt`). Empty for other
@@ -121,7 +123,7 @@ class History:
         return doubts_of(self.time, self.tow_force, self.length, self.shapes, self.tensions, how)
 
     def diagnostics(self) -> Mapping[str, float]:
-        """Return the numbers that tell how far to trust the run, by name."""
+        """Return the numbers that show how far to trust the run, by name."""
         return {
             "closure_error_m": float(self.closure_error.max()),
             "smallest_tension_N": float(min(tension.min() for tension in self.tensions)),
@@ -136,8 +138,8 @@ class History:
         """Return the run as an xarray dataset: time, node and axis named, units and words on everything.
 
         Variables are the fields of this class; the shapes are ``position``, the tensions ``tension`` (time, node), with
-        the coordinate ``arc_length``, the distance along the nodes from the tow point. Rows have room for the most
-        nodes, and NaN behind the last one.
+        the coordinate ``arc_length``, the distance along the nodes from the tow point. Rows are as long as the
+        largest number of nodes requires, and are padded with NaN after the last one.
 
         >>> import cable
         >>> run = cable.pull_out(lambda t: (1.0, 0.0, 0.0), 2.0).to_dataset()
@@ -211,7 +213,7 @@ class History:
 
 
 def _filled(rows: Sequence[np.ndarray]) -> np.ndarray:
-    """Return arrays of nodes (nodes, …) in rows of equal length (n, most nodes, …), NaN behind the last node."""
+    """Return arrays of nodes (nodes, …) in rows of equal length (n, most nodes, …), NaN after the last node."""
     filled = np.full((len(rows), max(map(len, rows)), *rows[0].shape[1:]), np.nan)
     for row, values in zip(filled, rows, strict=True):
         row[: len(values)] = values
@@ -223,7 +225,7 @@ class Equilibrium:
     """A cable at rest between two ends.
 
     Attributes:
-        cable: what it is made of.
+        cable: the cable's properties.
         current: how the water moves.
         length: unstretched. [m]
         shape: node positions from the first end to the second, in the axes of `ends` (nodes, 3). [m]

@@ -22,7 +22,7 @@ Place = Sequence[float] | np.ndarray
 """North, east, down. [m]"""
 
 SEGMENTS = 100
-"""So many where nobody asks for a segment length: a catenary's force is then right within about 1e-4."""
+"""Number of segments if no segment length is given: the force of a catenary is then right within about 1e-4."""
 MOST_SEGMENTS = 100_000
 MOST_STRAIN = 1.0
 """A cable that is pulled to more than twice its length is a mistake."""
@@ -33,7 +33,7 @@ RESCALINGS = 3
 WEIGHTLESS = 1e-9
 """A cable with less tension than this has no load at all. [N]"""
 TAUT = 1.0 - 1e-9
-"""An unstretchable cable whose ends are this share of its length apart has no tension that weight could tell."""
+"""If the ends of an unstretchable cable are this share of its length apart, weight does not determine its tension."""
 
 
 class HoldError(UserError, ValueError):
@@ -149,7 +149,7 @@ def _checked_ends(ends: Sequence[Place] | np.ndarray) -> np.ndarray:
 
 
 def _positive(name: str, given: object) -> float:
-    """Return a length as a float, or refuse what is none [m]."""
+    """Return a length as a float [m]; raise an error if it is not a positive number."""
     length = real(given)
     if length is None or length <= 0.0:
         message = f"hold: {name} is {short(given)}; it must be a positive number of metres."
@@ -158,7 +158,7 @@ def _positive(name: str, given: object) -> float:
 
 
 def _checked_length(places: np.ndarray, given: float, cable: CableProperties) -> float:
-    """Return the length; raise an error if no cable of that length reaches, or if it is none. [m]."""
+    """Return the length; raise an error if no cable of that length reaches, or if it is not a length. [m]."""
     length = _positive("length", given)
     apart = float(np.linalg.norm(places[0] - places[1]))
     if cable.compliance == 0.0 and apart >= TAUT * length:
@@ -233,7 +233,7 @@ def _found(
     steps: int,
     scale: float,
 ) -> Equilibrium:
-    """Return what a line at rest says; its forces are in units of `scale`."""
+    """Return the equilibrium from a line at rest; its forces are in units of `scale`."""
     N = line.ends.count
     return Equilibrium(
         cable=cable,

@@ -1,4 +1,4 @@
-"""Whether what a run will keep fits into memory, before it is asked for: a refusal, not a process that is killed."""
+"""Whether the results of a run fit into memory, checked before allocation: an error, not a process that is killed."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from subzero.errors import UserError
 SHARE = 0.8
 """A run may ask for this share of the memory that is free. [-]"""
 SMALL = 2.0**24
-"""So little is had without a look at what is free, which takes longer than a second of a short run. [bytes]"""
+"""Up to this size no check of the free memory is made, as the check takes longer than a second of a short run.
+[bytes]"""
 GIB = 1024.0**3
 
 
@@ -27,12 +28,12 @@ def free_memory() -> float:
 
 
 def fits(size: float) -> bool:
-    """Say whether so many bytes can be had."""
+    """Return whether so many bytes can be had."""
     return size <= SMALL or size <= SHARE * free_memory()
 
 
 def refuse_unless_it_fits(size: float, what: str, remedy: str) -> None:
-    """Raise a UserError if so many bytes cannot be had: what needs them, and what to change."""
+    """Raise a UserError if so many bytes are not available: it names their purpose, and the setting to change."""
     if not fits(size):
         raise UserError(
             f"{what} needs {size / GIB:.3g} GiB of memory, and {free_memory() / GIB:.3g} GiB are free. {remedy}"

@@ -1,4 +1,4 @@
-"""What a cable is: values with units, and the plain numbers that compiled code takes.
+"""The properties of a cable: values with units, and the plain numbers that compiled code takes.
 
 Symbols are those of Feng & Allen (2004), section 2.2; defaults are their Table 1.
 """
@@ -68,7 +68,7 @@ class CableProperties:
     minimum_bend_radius: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a cable."""
+        """Raise an error if the fields do not describe a possible cable."""
         for each in fields(self):
             above = 0.0 if each.name in ABOVE_ZERO else None
             value = checked(type(self).__name__, each.name, getattr(self, each.name), least=0.0, above=above)

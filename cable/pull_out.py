@@ -49,7 +49,7 @@ class Scheme:
         options: with which it runs when it is asked for by name; their class says which options there are.
         pull_out: computes a cable that is pulled off a drum.
         tow: computes one of a fixed length; None where it cannot.
-        knows: what a cable that is pulled off a drum may ask for.
+        knows: features that a cable pulled off a drum may ask for, and the scheme supports.
     """
 
     options: Options
@@ -105,12 +105,12 @@ def pull_out(
             each with its options, or a name of `cable.SCHEMES` for one as it is by default.
 
     Returns:
-        the history from t = 0 on. Look at `history.outcome`: a run that could not go on keeps what it has.
+        the history from t = 0 on. See `history.outcome`: a run that could not go on keeps its results up to then.
 
     Raises:
-        subzero.UserError: a duration that is not positive, an unknown scheme or one that does not know what is asked
-            for, a tow velocity or current that is not three finite numbers, a run that does not fit into memory. (Bad
-            values are a ValueError, too.)
+        subzero.UserError: a duration that is not positive, an unknown scheme or one that does not support a given
+            option, a tow velocity or current that is not three finite numbers, a run that does not fit into memory.
+            (Bad values are a ValueError, too.)
     """
     row, options = _chosen(scheme)
     task = PullOut.of(tow_velocity, duration, cable=cable, drum=drum, current=current, start=start)

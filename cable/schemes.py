@@ -20,14 +20,14 @@ from subzero.arguments import checked_arguments
 from subzero.errors import BadValueError, checked, short, suggestion, truth
 
 SHORTEST_S = 1e-9
-"""A run or a step that is shorter cannot be halved where it is difficult: what it is halved to is rounded away. [s]"""
+"""A run or a step that is shorter cannot be halved where it is difficult: the halves would be rounded away. [s]"""
 TOLERANCE = 1e-9
-"""How exactly a step is solved where nobody asks for less: this share of the largest tension, strains of 1e-12. [-]"""
+"""How exactly a step is solved by default: this share of the largest tension, strains of 1e-12. [-]"""
 FINEST, COARSEST = 1e-12, 1e-3
 """Between these a tolerance makes sense: rounding is below, and the error of a step above. [-]"""
 LONGEST_RUN_IN_M = 100.0
 READINGS = ("tangent", "drum")
-"""What the paper's new node begins with: the tangent of its neighbour, or the same turned back around the drum."""
+"""The initial tangent of the paper's new node: that of its neighbour, or the same turned back around the drum."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ class MovingEnd:
     tolerance: float = TOLERANCE
 
     def __post_init__(self) -> None:
-        """Refuse what makes no step, no segment and no error."""
+        """Raise an error if a step, a segment length or a tolerance is not valid."""
         _check_steps(self)
         _keep(self, "rtol", least=0.0, most=0.5)
         _keep(self, "grading", least=0.0, most=0.5)
@@ -87,7 +87,7 @@ class Lumped:
     segment_length: float = 0.5
 
     def __post_init__(self) -> None:
-        """Refuse what makes no step and no segment."""
+        """Raise an error if a step or a segment length is not valid."""
         _check_steps(self)
 
 
@@ -105,7 +105,7 @@ class Equation7:
     segment_length: float = 0.5
 
     def __post_init__(self) -> None:
-        """Refuse what makes no step and no segment."""
+        """Raise an error if a step or a segment length is not valid."""
         _check_steps(self)
 
 
@@ -126,7 +126,7 @@ class Paper:
     implicit: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse what makes no step, and a reading that there is not."""
+        """Raise an error if the step is not valid, or the reading does not exist."""
         _keep(self, "time_step", least=SHORTEST_S, unit="s")
         if self.reading not in READINGS:
             raise BadValueError(
@@ -137,7 +137,7 @@ class Paper:
 
     @property
     def name(self) -> str:
-        """What results call it, ``paper_tangent`` or ``paper_drum``."""
+        """Its name in results, ``paper_tangent`` or ``paper_drum``."""
         return f"paper_{self.reading}"
 
 

@@ -1,4 +1,4 @@
-"""What is to be computed, as a value: a cable that is pulled off a drum, or one of a fixed length that is towed.
+"""A task as a value: a cable that is pulled off a drum, or one of a fixed length that is towed.
 
 `cable.pull_out` and `cable.tow` make a task of what they are given, and every scheme takes it from there: all of them
 compute the same thing.
@@ -28,7 +28,7 @@ START_LENGTH = 1e-6
 WINCH, MOVING_DRUM, UNEVEN_CURRENT = "a winch", "a drum that moves", "a current that changes"
 WET_LENGTH, EQUILIBRIUM = "cable in the water at the start", "a start from cable.hold"
 EVERYTHING = frozenset({WINCH, MOVING_DRUM, UNEVEN_CURRENT, WET_LENGTH, EQUILIBRIUM})
-"""What a task may ask for beyond a free drum on the shore, uniform water and no cable at the start."""
+"""Features that a task may ask for beyond a free drum on the shore, uniform water and no cable at the start."""
 
 
 @checked_arguments
@@ -80,7 +80,7 @@ class PullOut:
         current: Sequence[float] | np.ndarray | Current | None = None,
         start: float | Equilibrium = 0.0,
     ) -> PullOut:
-        """Return the task of `cable.pull_out`, with what is not given filled in.
+        """Return the task of `cable.pull_out`, with defaults filled in.
 
         Raises:
             subzero.UserError: what makes no sense by itself.
@@ -109,7 +109,7 @@ class PullOut:
         return self.start.length if isinstance(self.start, Equilibrium) else max(self.start, START_LENGTH)
 
     def asks_for(self) -> list[str]:
-        """Return what of `EVERYTHING` it asks for."""
+        """Return the features of `EVERYTHING` that it asks for."""
         asked = {
             WINCH: not isinstance(self.drum, DrumProperties),
             MOVING_DRUM: self.drum_velocity is not None,
@@ -151,7 +151,7 @@ class Tow:
         current: Sequence[float] | np.ndarray | Current | None = None,
         drogue_drag_area: float = 0.0,
     ) -> Tow:
-        """Return the task of `cable.tow`, with what is not given filled in.
+        """Return the task of `cable.tow`, with defaults filled in.
 
         Raises:
             subzero.UserError: what makes no sense by itself.
@@ -177,7 +177,7 @@ def checked_duration(value: float) -> float:
 
 
 def current_of(current: Sequence[float] | np.ndarray | Current | None) -> Current:
-    """Return a current from what users give: nothing, three numbers, or a current."""
+    """Return a current from the argument of a user: nothing, three numbers, or a current."""
     if isinstance(current, Current):
         return current
     return Current.uniform(np.zeros(3) if current is None else current)

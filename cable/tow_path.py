@@ -1,4 +1,4 @@
-"""The ways of a cable's ends, sampled from their velocities, and whether there is room to follow them.
+"""The ways of a cable's ends, sampled from their velocities, and whether there is memory to follow them.
 
 Every scheme samples its paths here, so all of them run the same way.
 """
@@ -103,7 +103,7 @@ SHORTEN = "Record less often (a longer step), or take longer segments (segment_l
 
 
 def check_memory(rows: int, segments: int) -> None:
-    """Refuse a run of so many results with shapes of so many segments if it does not fit into memory."""
+    """Raise an error if a run of so many results with shapes of so many segments does not fit into memory."""
     size = rows * (segments + 2.0) * BYTES_A_NODE + segments * BYTES_A_SEGMENT
     what = f"A run of {rows} results with up to {segments} segments each"
     refuse_unless_it_fits(size, what, SHORTEN)
@@ -112,7 +112,7 @@ def check_memory(rows: int, segments: int) -> None:
 def _three_numbers(
     values: Sequence[Sequence[float] | np.ndarray], name: str, moments: np.ndarray
 ) -> np.ndarray:
-    """Return velocities as an array (times, 3) of finite numbers, or say what is wrong with the first that is none."""
+    """Return velocities as an array (times, 3); report the first that is not three finite numbers in an error."""
     try:
         array = np.array(values)
         if array.shape == (moments.size, 3) and array.dtype.kind in "iuf" and np.isfinite(array).all():

@@ -1,11 +1,12 @@
-"""Winches: what turns the drum when it is not the cable alone.
+"""Winches: they turn the drum when it is not turned by the cable alone.
 
     PayOutRate       the length in the water follows a rate, S(t) = S(0) + ∫ rate dt; negative reels in, down to nothing
-    Brake            the drum stands: the length stays what it is
-    ConstantTension  the drum pays out and reels in so that T(S) stays what it is asked to be
+    Brake            the drum stands: the length is constant
+    ConstantTension  the drum pays out and reels in so that T(S) equals the commanded tension
 
-A free drum is `cable.DrumProperties`. Each has two methods: `numbers` for compiled code, and `setpoints`, what is asked
-for at given times. The length is a state of the cable that the winch leads; nothing along the cable is rescaled.
+A free drum is `cable.DrumProperties`. Each has two methods: `numbers` for compiled code, and `setpoints`, the
+commanded values at given times. The length is a state of the cable that the winch controls; nothing along the cable
+is rescaled.
 """
 
 from __future__ import annotations
@@ -36,7 +37,7 @@ class PayOutRate:
     rate: Schedule
 
     def __post_init__(self) -> None:
-        """Refuse what is no rate."""
+        """Raise an error if the rate is not valid."""
         _check_schedule(self, "rate", self.rate)
 
     def numbers(self) -> DrumNumbers:
@@ -56,7 +57,7 @@ class PayOutRate:
 
 @dataclass(frozen=True, kw_only=True)
 class Brake:
-    """A drum that stands."""
+    """A drum that is held."""
 
     def numbers(self) -> DrumNumbers:
         """Return the plain numbers that compiled code takes."""
@@ -78,7 +79,7 @@ class ConstantTension:
     tension: Schedule
 
     def __post_init__(self) -> None:
-        """Refuse what is no tension."""
+        """Raise an error if the tension is not valid."""
         _check_schedule(self, "tension", self.tension, above=0.0)
 
     def numbers(self) -> DrumNumbers:
@@ -104,7 +105,7 @@ Winch = PayOutRate | Brake | ConstantTension
 
 
 def _check_schedule(winch: Winch, name: str, schedule: object, above: float | None = None) -> None:
-    """Refuse what is neither a function nor a number."""
+    """Raise an error if a schedule is neither a function nor a number."""
     if not callable(schedule):
         checked(type(winch).__name__, name, schedule, above=above)
 

@@ -17,10 +17,11 @@ Signs, here and everywhere: depth is positive down, heading runs clockwise from 
 the heading to starboard (it increases), positive stern-planes (both) pitch the nose up. Files speak of
 degrees and revolutions per second; a `Trial` of radians and revolutions per second.
 
-Stories: `trial` what a trial is; `instructions` what its vehicle is told, commands or a motion; `steps` the times of a
-run, and what holds at them; `quantities` the one table of numbers, units and limits; `checks` values that are refused
-where they are made; `schema` what a file may say; `files` opening and parsing; `parts` vehicles and cables; `samples`
-columns over time; `reader` all together; `errors` what a problem is.
+Modules: `trial` the value that describes a trial; `instructions` the commands or the motion of its vehicle; `steps`
+the times of a run, and the settings at them; `quantities` the one table of numbers, units and limits; `checks`
+validation of values where they are made; `schema` the contents that a file may have; `files` opening and parsing;
+`parts` vehicles and cables; `samples` columns over time; `reader` reads them together; `errors` the report of a
+problem.
 """
 
 from __future__ import annotations
@@ -87,7 +88,7 @@ def load(
         motion_csv: a CSV file of a motion that replaces the commands or the motion of the scenario, and what its start
             says besides the cable.
         check_vehicle: takes the numbers of the vehicle and gives what its own equations find wrong with them,
-            as objects with the attributes key, found, why, allowed. (This package knows no vehicle.)
+            as objects with the attributes key, found, why, allowed. (This package does not depend on the vehicle.)
 
     Raises:
         ScenarioError: with every problem of every file.
@@ -105,7 +106,7 @@ def names() -> list[str]:
 
 
 def describe(name: str) -> str:
-    """Return what a scenario we ship is, in one line.
+    """Return the description of a scenario we ship, in one line.
 
     Raises:
         ScenarioError: there is no such scenario.

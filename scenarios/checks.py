@@ -1,4 +1,4 @@
-"""Refuse values where they are made, whoever makes them, a file or Python: by the limits of `quantities`.
+"""Validation of values where they are made, by a file or in Python: by the limits of `quantities`.
 
 >>> import scenarios
 >>> scenarios.Start(heading=27.0)
@@ -24,7 +24,7 @@ NO_NUMBER = "this is not a finite number"
 
 
 class Checks:
-    """What is wrong with the fields of one value, collected and told together.
+    """Problems with the fields of one value, collected and reported together.
 
     Args:
         value: a frozen dataclass that is being made; a field that is right is replaced by its plain number or array.
@@ -46,7 +46,7 @@ class Checks:
         if number is None:
             self.say(name, NO_NUMBER, quantity.allowed, given)
         elif not _inside(number, quantity):
-            self._outside(name, number, quantity)
+            self._note_out_of_limits(name, number, quantity)
         else:
             self._keep(name, number)
 
@@ -63,7 +63,7 @@ class Checks:
         numbers = tuple(array.tolist())
         for i, (number, quantity) in enumerate(zip(numbers, quantities, strict=True)):
             if not _inside(number, quantity):
-                self._outside(f"{name}[{i}]", number, quantity)
+                self._note_out_of_limits(f"{name}[{i}]", number, quantity)
         self._keep(name, numbers)
 
     def rows(
@@ -93,7 +93,7 @@ class Checks:
             self.say(f"{name}[{at}]", why, f"{what} must increase.", values[at].item())
 
     def kind(self, name: str, kinds: tuple[type, ...], optional: bool = False) -> bool:
-        """Check what a field is; return whether it is there and right."""
+        """Check the kind of a field; return whether it is given and right."""
         given = getattr(self._value, name)
         if isinstance(given, kinds):
             return True
@@ -103,7 +103,7 @@ class Checks:
         return False
 
     def mapping(self, name: str) -> None:
-        """Check that a field holds numbers by name, in tables if need be; what they mean is checked by who knows."""
+        """Check that a field holds numbers by name, in tables if necessary; their meaning is checked elsewhere."""
         table = getattr(self._value, name)
         if not isinstance(table, Mapping):
             self.say(name, "this is no mapping", "Allowed: key → number.", table)
@@ -124,11 +124,11 @@ class Checks:
         object.__setattr__(self._value, name, value)
 
     def freeze(self, name: str, array: np.ndarray) -> None:
-        """Keep an array as the field, so that nobody can change it unseen."""
+        """Keep an array as the field, read-only, so that it cannot be changed unseen."""
         array.setflags(write=False)
         self._keep(name, array)
 
-    def _outside(self, name: str, number: float, quantity: Quantity) -> None:
+    def _note_out_of_limits(self, name: str, number: float, quantity: Quantity) -> None:
         """Note a number outside its limits, in inner units and in those of the files."""
         unit = {"degree": " rad", "degree/s": " rad/s", "1": ""}.get(quantity.unit, f" {quantity.unit}")
         file = f" ({number / quantity.scale:g} {quantity.unit})" if quantity.scale != 1.0 else ""
@@ -140,10 +140,12 @@ class Checks:
         """Note the first number of a column that is outside its limits."""
         wrong = np.flatnonzero(~_inside(values, quantity))
         if wrong.size:
-            self._outside(f"{name}[{wrong[0]}]", float(values[wrong[0]]), quantity)
+            self._note_out_of_limits(f"{name}[{wrong[0]}]", float(values[wrong[0]]), quantity)
 
     def _array(self, name: str, shape: tuple[int | None, ...]) -> np.ndarray | None:
-        """Return a field as an array of finite numbers of a shape (None: any count above zero); note what is wrong."""
+        """Return a field as an array of finite numbers of a shape (None: any count above zero); note the problems
+        found.
+        """
         given = getattr(self._value, name)
         words = " × ".join("samples" if n is None else str(n) for n in shape)
         try:
@@ -171,7 +173,7 @@ class Checks:
 
 
 def _all_finite(table: Mapping[str, Any]) -> bool:
-    """Say whether all of a table, and of the tables in it, is a finite number."""
+    """Return whether all of a table, and of the tables in it, is a finite number."""
     for inside in table.values():
         if not (_all_finite(inside) if isinstance(inside, dict) else real(inside) is not None):
             return False

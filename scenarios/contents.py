@@ -1,4 +1,4 @@
-"""What a trial, a vehicle or a cable says, number by number: value, unit, what is plausible, and where it comes from.
+"""The contents of a trial, a vehicle or a cable, number by number: value, unit, plausible range, and source.
 
 For people who look before they run (`subzero show`). A trial's numbers come with the limits and the meaning of the
 table of quantities; those of a vehicle or a cable with the range and the source that their own file gives.
@@ -23,10 +23,10 @@ from scenarios.trial import Trial
 from subzero.errors import printable
 
 SENTENCE_END = re.compile(r"(?<=[\w)]{2})\. (?=[A-Z])")
-"""A stop behind a whole word, which an initial is not."""
+"""A full stop after a whole word, which an initial is not."""
 
 LONGEST = 160
-"""A sentence is cut behind so many letters."""
+"""A sentence is cut after so many letters."""
 
 FOLDERS = {"trial": "trials", "vehicle": "vehicles", "cable": "cables"}
 """Kind of file → the folder of those that are shipped."""
@@ -42,7 +42,7 @@ class Number:
         unit: in the file.
         low: least plausible value; of a trial, the least that is allowed.
         high: greatest.
-        source: where the value comes from; of a trial, what it means.
+        source: where the value comes from; of a trial, its meaning.
     """
 
     name: str
@@ -73,7 +73,7 @@ class Contents:
 
 
 def first_line(kind: str, name: str) -> str:
-    """Return what a shipped vehicle or cable is: the first sentence of its file."""
+    """Return the description of a shipped vehicle or cable: the first sentence of its file."""
     return first_sentence(shipped_path(FOLDERS[kind], name).read_text(encoding="utf-8"))
 
 
@@ -104,7 +104,7 @@ def locate(name_or_path: str | Path) -> tuple[str, Source]:
 
 
 def _kind_of(source: Source) -> str:
-    """Return what a user's file is, by the sections that only this kind has."""
+    """Return the kind of a user's file, by the sections that only this kind has."""
     table = source.table
     for kind, key, shape in (("vehicle", "hull", dict), ("cable", "drum", dict), ("trial", "vehicle", str)):
         if isinstance(table.get(key), shape):
@@ -114,7 +114,7 @@ def _kind_of(source: Source) -> str:
 
 
 def contents(name_or_path: str | Path, trial: Trial | None = None) -> Contents:
-    """Return what a file says.
+    """Return the contents of a file.
 
     Args:
         name_or_path: name of a shipped trial, vehicle or cable, or the path of a TOML file.
@@ -166,7 +166,7 @@ def _of_part(kind: str, part: Part) -> Iterator[Number]:
 
 
 def _of_trial(trial: Trial, source: Source) -> Contents:
-    """Return the numbers of a trial that do not stand in another file, and what it changes of those."""
+    """Return the numbers of a trial that are not in another file, and those of other files that it changes."""
     changes, _ = read_changes(source)
     numbers = []
     for name in parameter_names(trial):

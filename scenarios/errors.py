@@ -1,4 +1,4 @@
-"""What is wrong with a file, said so that it can be repaired: all problems at once, each with its place.
+"""Problems with a file, described so that it can be repaired: all problems at once, each with its place.
 
 A problem has three parts: *what* was found and where, *why* it cannot be, and *what to do*.
 """
@@ -24,8 +24,8 @@ class Problem:
         line: line in the file, from 1; None where the whole file is meant.
         key: key or column, such as ``run.hull_step_s``; empty where none is meant.
         found: the value found, as text; empty where something is missing.
-        why: why it cannot be.
-        remedy: what is allowed, or the nearest valid name.
+        why: the reason.
+        remedy: the allowed values, or the nearest valid name.
     """
 
     file: str

@@ -45,7 +45,7 @@ class Source:
     Attributes:
         name: the file as the user named it.
         folder: folder that holds it, from which its own paths start.
-        text: what it says.
+        text: its text.
         table: the same, parsed.
         lines: dotted key → line, from 1.
     """
@@ -98,7 +98,7 @@ def find(name_or_path: str | Path) -> Source:
 
 
 def read_text(path: Path, name: str, most: int = MOST_OF_A_TOML) -> str:
-    """Return the text of a file, whatever its line ends; `name` is what messages call it.
+    """Return the text of a file, for any line ends; `name` is its name in messages.
 
     Raises:
         ScenarioError: it is not there, is no plain file, holds more than `most` bytes, cannot be read, or is not text.
@@ -145,7 +145,7 @@ def read_toml(path: Path, name: str) -> Source:
 
 
 def _is_deep(table: dict[str, Any]) -> bool:
-    """Say whether a file is nested deeper than any of ours has reason to be."""
+    """Return whether a file is nested deeper than any of ours has reason to be."""
     level: list[Any] = [table]
     for _ in range(MOST_LEVELS):
         inside = [each for thing in level for each in (thing.values() if isinstance(thing, dict) else thing)]

@@ -65,7 +65,7 @@ def expected(
 
 
 def continuous(heading: np.ndarray, like: np.ndarray | None = None, turn: float = TURN) -> np.ndarray:
-    """Return a heading without jumps of whole turns; gaps and what cannot be believed keep their places.
+    """Return a heading without jumps of whole turns; gaps and implausible samples keep their places.
 
     Args:
         heading: as it was measured, NaN in gaps (n,).
@@ -86,7 +86,9 @@ def continuous(heading: np.ndarray, like: np.ndarray | None = None, turn: float 
 
 
 def contradicted(heading: np.ndarray, like: np.ndarray | None = None, turn: float = TURN) -> np.ndarray:
-    """Say which samples lead away from those around them that join one another without them (n,); as `continuous`."""
+    """Return which samples lead away from those around them that join one another without them (n,); as
+    `continuous`.
+    """
     found, known = np.zeros(heading.size, dtype=bool), np.flatnonzero(np.isfinite(heading))
     away = (heading - (0.0 if like is None else like))[known]
     if away.size < FIRST:
@@ -126,8 +128,8 @@ def _is_no_turn(
 def _longest_chain(
     away: np.ndarray, begins: np.ndarray, jump: float, common: float, turn: float
 ) -> np.ndarray:
-    """Say which samples are believed: those of the stretches that join one another and hold the most samples, and what
-    lies before or behind all of them, unless it is a few samples (m,).
+    """Return which samples are believed: those of the stretches that join one another and hold the most samples, and
+    what lies before or behind all of them, unless it is a few samples (m,).
     """
     ends = np.r_[begins[1:], away.size]
     held, before = (ends - begins).astype(float), np.full(begins.size, -1)

@@ -1,4 +1,4 @@
-"""What a vehicle is told, as values: commands to its actuators, or a motion that is prescribed.
+"""The instructions of a vehicle, as values: commands to its actuators, or a motion that is prescribed.
 
 Commands are sampled and held: `Commands.at` says what holds at a time, and nothing else in the product does.
 
@@ -34,7 +34,7 @@ REACH_THE_END = "Give samples to the end of the run, or shorten the duration to 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Commands:
-    """What the actuators are told; each sample is held until the next, the last one to the end.
+    """The commands to the actuators; each sample is held until the next, the last one to the end.
 
     Attributes:
         time: starts at 0 and increases. Shape (samples,). [s]
@@ -45,7 +45,7 @@ class Commands:
     values: np.ndarray
 
     def __post_init__(self) -> None:
-        """Refuse what are no commands; keep arrays of their own that cannot be changed."""
+        """Raise an error if the fields do not form commands; keep arrays of their own that cannot be changed."""
         check = Checks(self)
         time = check.rows("time", COMMANDS[:1])
         values = check.rows("values", COMMANDS[1:], None if time is None else time.size)
@@ -57,7 +57,7 @@ class Commands:
         check.freeze("values", values)
 
     def at(self, time: np.ndarray | float) -> np.ndarray:
-        """Return what is commanded at some times, the sample that holds: shape of `time`, then (4,).
+        """Return the commands at some times, the sample that holds: shape of `time`, then (4,).
 
         >>> fin = Commands(time=np.array([0.0, 2.0]), values=np.array([[9.0, 0.0, 0.0, 0.0], [9.0, 0.1, 0.0, 0.0]]))
         >>> fin.at(np.array([0.0, 1.9, 2.0, 50.0]))[:, 1].tolist()
@@ -88,7 +88,7 @@ class Motion:
         sway_speed: v, to starboard; None if it is not known, as all that follow. Shape (samples,). [m/s]
         heave_speed: w, along the body's down axis. Shape (samples,). [m/s]
         roll: φ, positive starboard side down. Shape (samples,). [rad]
-        roll_rate: p; only beside a roll. Shape (samples,). [rad/s]
+        roll_rate: p; only together with a roll. Shape (samples,). [rad/s]
         pitch_rate: q. Shape (samples,). [rad/s]
         yaw_rate: r. Shape (samples,). [rad/s]
         north: place of the hull centre. Shape (samples,). [m]
@@ -113,7 +113,7 @@ class Motion:
     interpolation: str | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no motion; keep arrays of their own that cannot be changed."""
+        """Raise an error if the fields do not form a motion; keep arrays of their own that cannot be changed."""
         check, columns = Checks(self), by_field(MOTION)
         given = [name for name in columns if name in REQUIRED or getattr(self, name) is not None]
         time = check.rows("time", MOTION[:1])
@@ -147,7 +147,7 @@ class Motion:
 
     @property
     def given(self) -> tuple[str, ...]:
-        """Names of what is given over time."""
+        """Names of the fields that are given over time."""
         return tuple(name for name in by_field(MOTION) if name != "time" and getattr(self, name) is not None)
 
 
@@ -159,7 +159,7 @@ def interpolation_of(given: Collection[str], asked: str | None) -> str:
 
 
 def motion_faults(given: Collection[str], asked: str | None) -> list[tuple[str, str, str]]:
-    """Return what does not fit in a motion that gives some fields: the field, why, and what to do."""
+    """Return the problems of a motion that gives some fields: the field, the reason, and the remedy."""
     faults = []
     more = [name for name in given if name not in REQUIRED]
     if not (asked is None or (isinstance(asked, str) and asked in INTERPOLATIONS)):  # asked may be an array
@@ -183,7 +183,7 @@ def gap_at(time: np.ndarray) -> int | None:
 
 
 def gap_in_words(time: np.ndarray, at: int) -> tuple[str, str]:
-    """Return why a gap before sample `at` cannot be, and what to do."""
+    """Return why a gap before sample `at` is not possible, and the remedy."""
     gap, usual = time[at] - time[at - 1], float(np.median(np.diff(time)))
     why = f"nothing is known for {gap:g} s before it, in a record with a sample every {usual:g} s"
     return why, "Fill the gap, or end the run before it."

@@ -62,7 +62,7 @@ def with_parameters(trial: Trial, values: Mapping[str, float]) -> Trial:
     """Return a trial with other values for some of its numbers.
 
     Args:
-        trial: what is changed; it stays as it is.
+        trial: the trial to change; it is not modified.
         values: dotted name → value, in the units of the files.
 
     Raises:
@@ -150,7 +150,7 @@ def parameter_values(trial: Trial, name: str) -> list[float]:
 
 
 def quantity_of(trial: Trial, name: str) -> Row:
-    """Return what is known of a number: a row of the table of quantities, or a leaf of the pattern of a part.
+    """Return the row of the table of quantities for a number, or the leaf of the pattern of a part.
 
     Raises:
         ScenarioError: the trial has no such number.
@@ -160,7 +160,7 @@ def quantity_of(trial: Trial, name: str) -> Row:
 
 
 def declared_ranges(trial: Trial) -> dict[str, tuple[float, float]]:
-    """Return what the files of vehicle, cable and drum declare as plausible: dotted name → least, greatest value.
+    """Return the ranges that the files of vehicle, cable and drum declare: dotted name → least, greatest value.
 
     The files are those that the trial names. A value that [changes] has moved keeps the range of its file.
 
@@ -175,7 +175,7 @@ def declared_ranges(trial: Trial) -> dict[str, tuple[float, float]]:
 
 
 def ranges_in(part: Source) -> dict[str, tuple[float, float]]:
-    """Return what the file of a vehicle or a cable declares as plausible: dotted key → least, greatest value."""
+    """Return the ranges that the file of a vehicle or a cable declares: dotted key → least, greatest value."""
     return {
         key: (float(leaf["range"][0]), float(leaf["range"][1]))
         for key, leaf in leaves(part.table)
@@ -198,10 +198,11 @@ def part_file(trial: Trial, kind: str) -> Source:
 
 
 def with_vehicle(trial: Trial, named: str | Path) -> tuple[Trial, Source]:
-    """Return a trial with another vehicle, and the file of that; single values that the trial changes stay changed.
+    """Return a trial with another vehicle, and the file of that vehicle; single values changed by the trial remain
+    changed.
 
     Args:
-        trial: what is changed; it stays as it is.
+        trial: the trial to change; it is not modified.
         named: a vehicle that we ship, or the path of a file, from the working directory.
 
     Raises:
@@ -236,15 +237,15 @@ def _part(source: Source, kind: str, named: str) -> tuple[Part, Source]:
 
 
 def _source_of(trial: Trial) -> Source:
-    """Return the file of a trial again, from what it keeps of it."""
+    """Return the file of a trial again, from the sources that it keeps."""
     table = tomllib.loads(trial.text) if trial.text else {}
     return Source(name=trial.source, folder=Path(trial.source).parent, text=trial.text, table=table, lines={})
 
 
-# What there is, and what is wrong with a name or a value.
+# The names that exist, and the problems of a name or a value.
 
 Row = Quantity | Leaf
-"""What is known of a number: its limits, its unit."""
+"""The quantity of a number: its limits, its unit."""
 
 
 @cache
@@ -253,7 +254,7 @@ def _part_rows() -> dict[str, Leaf]:
 
 
 def _known(trial: Trial) -> dict[str, tuple[Row, np.ndarray]]:
-    """Return dotted name → what it is, and its value or values (n,), in the unit of the files."""
+    """Return dotted name → its quantity, and its value or values (n,), in the unit of the files."""
     known: dict[str, tuple[Row, np.ndarray]] = {}
     for name, row in _part_rows().items():
         known[name] = row, np.array([_part_value(trial, name)])
@@ -269,7 +270,9 @@ def _known(trial: Trial) -> dict[str, tuple[Row, np.ndarray]]:
 
 
 def _row(trial: Trial, name: str) -> tuple[Row, int] | None:
-    """Return what a number is, and of how many a list has; None if there is none. Quick for single numbers."""
+    """Return the quantity of a number, and the length of its list; None if there is none. Quick for single
+    numbers.
+    """
     section, _, key = name.partition(".")
     if section in PARTS:
         row = _part_rows().get(name)
@@ -283,7 +286,7 @@ def _row(trial: Trial, name: str) -> tuple[Row, int] | None:
 
 
 def _problem(trial: Trial, name: str, value: object) -> Problem | None:
-    """Return what is wrong with a name or its value; None if nothing is."""
+    """Return the problem with a name or its value; None if there is none."""
     found, at = _row(trial, _list_of(name)), _at(name)
     if found is None or (at is not None and at >= found[1]) or ("[" in name and at is None):
         return _unknown(trial, name)

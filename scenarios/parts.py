@@ -1,10 +1,10 @@
 """Vehicle and cable files: every number with its unit, its plausible range, and where it comes from.
 
 A number is an inline table ``{ value = 6.6, unit = "kg", range = [6.4, 7.5], source = "..." }``. The first
-file we ship of each kind is its *pattern*: a user's file must have the same sections, keys and units; only what is
-`OPTIONAL` may be missing. ``range`` says what is plausible: readers, sweeps and calibrations
-go by it. ``tolerance``, which may be left out, says how far a healthy vehicle may be from the value (one standard
-deviation): diagnoses go by it. ``limits`` in the pattern says what is possible, and is enforced.
+file we ship of each kind is its *pattern*: a user's file must have the same sections, keys and units; only entries
+that are `OPTIONAL` may be missing. ``range`` gives the plausible values, which readers, sweeps and calibrations
+use. ``tolerance``, which may be left out, says how far a healthy vehicle may be from the value (one standard
+deviation); diagnoses use it. ``limits`` in the pattern gives the possible values, and is enforced.
 
 The section [changes] of a trial gives single values that differ from these files:
 
@@ -144,7 +144,7 @@ def leaves(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Lea
 
 
 def _complaint(leaf: Leaf, model: Leaf, key: str) -> tuple[str, str] | None:
-    """Return why a number of a part cannot be used, and what to do; None if it can."""
+    """Return why a number of a part cannot be used, and the remedy; None if it can."""
     unit = model["unit"]
     unknown = [name for name in leaf if name not in LEAF_KEYS]
     if unknown:
@@ -158,7 +158,7 @@ def _complaint(leaf: Leaf, model: Leaf, key: str) -> tuple[str, str] | None:
 
 
 def tolerance_complaint(value: object, unit: str) -> tuple[str, str] | None:
-    """Return why a value cannot be the tolerance of a number, and what to do; None if it can."""
+    """Return why a value cannot be the tolerance of a number, and the remedy; None if it can."""
     allowed = f"Allowed: above 0{'' if unit == '1' else f' {unit}'}."
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
         return "this is not a finite number", allowed
@@ -166,7 +166,7 @@ def tolerance_complaint(value: object, unit: str) -> tuple[str, str] | None:
 
 
 def value_complaint(value: object, model: Leaf, key: str) -> tuple[str, str] | None:
-    """Return why a value cannot be used for a number of the pattern, and what to do; None if it can."""
+    """Return why a value cannot be used for a number of the pattern, and the remedy; None if it can."""
     low, high, allowed = _limits(model, key)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return "this is not a number", allowed

@@ -1,4 +1,4 @@
-"""The one table of what a trial file may hold: numbers with unit, limits, default and meaning, and the words.
+"""The one table of the numbers of a trial file: with unit, limits, default and meaning, and the words.
 
 The unit is part of the name, as in ``hull_step_s``. Limits are hard: a number outside is a slip of the pen or
 of the unit, and is refused. A quantity without a default must be given. The TOML reader, the CSV reader and
@@ -12,14 +12,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 ROUNDING = 1e-12
-"""What was degrees in a file may be beyond its limit by rounding. [-]"""
+"""A number given in degrees in a file may be beyond its limit by this rounding. [-]"""
 INNER = {"degree": math.pi / 180.0, "degree/s": math.pi / 180.0}
 """Inner units per unit of a file: radians inside; all other units are kept."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Quantity:
-    """One number: its name in files, its unit there, and what is allowed.
+    """One number: its name in files, its unit there, and its limits.
 
     Attributes:
         name: name of the key or of the column, with its unit.
@@ -46,13 +46,15 @@ class Quantity:
 
     @cached_property
     def inner_limits(self) -> tuple[float, float]:
-        """Least and greatest value in inner units, with what rounding may add to what was degrees in a file."""
+        """Least and greatest value in inner units, with a margin for the rounding of numbers given in degrees in a
+        file.
+        """
         low, high = self.low * self.scale, self.high * self.scale
         return low - ROUNDING * abs(low), high + ROUNDING * abs(high)
 
     @property
     def allowed(self) -> str:
-        """What is allowed, as a sentence for a message."""
+        """The allowed values, as a sentence for a message."""
         unit = "" if self.unit == "1" else f" {self.unit}"
         return f"Allowed: {self.low:g} to {self.high:g}{unit} ({self.meaning})."
 
@@ -200,7 +202,7 @@ SCHEMES = ("moving_end", "paper", "paper_tangent", "paper_drum")
 ("paper" is the usable one, "paper_tangent")."""
 
 CONTROLS = ("pay_out_rate", "constant_tension", "brake")
-"""What a winch does; without a winch the drum is free, and the cable is pulled off it."""
+"""Controls of a winch; without a winch the drum is free, and the cable is pulled off it."""
 
 LINEAR, SMOOTH = INTERPOLATIONS = ("linear", "smooth")
-"""What a motion does between its samples: straight lines with kinks, or curves without."""
+"""Interpolations of a motion between its samples: straight lines with kinks, or curves without."""

@@ -51,7 +51,7 @@ Read = tuple[dict[str, Any], list[Problem]]
 
 @dataclass(frozen=True, kw_only=True)
 class Reading:
-    """A trial file while it is read: what it says, and what is wrong so far."""
+    """A trial file while it is read: its contents, and the problems found so far."""
 
     source: Source
     problems: list[Problem] = field(default_factory=list)
@@ -81,7 +81,7 @@ def load(
         motion_csv: a CSV file of a motion that replaces the commands or the motion of the scenario, and what its start
             says besides the cable.
         check_vehicle: takes the numbers of the vehicle and gives what its own equations find wrong with them,
-            as objects with the attributes key, found, why, allowed. (This package knows no vehicle.)
+            as objects with the attributes key, found, why, allowed. (This package does not depend on the vehicle.)
 
     Raises:
         ScenarioError: with every problem of every file.
@@ -130,7 +130,7 @@ def load(
 
 
 def _in_order(problems: list[Problem]) -> list[Problem]:
-    """Sort problems by line within each file; files stay in the order in which they were read."""
+    """Sort problems by line within each file; files keep the order in which they were read."""
     files = list(dict.fromkeys(problem.file for problem in problems))
     return sorted(problems, key=lambda problem: (files.index(problem.file), problem.line or 0))
 
@@ -177,7 +177,9 @@ def _complaint(reading: Reading, part: Part, changed: Mapping[str, float], said:
 
 
 def check_trim(source: Source, start: Mapping[str, Any]) -> list[Problem]:
-    """Return what [start] says beside at_trim, though that finds it, or does not say, though that needs it."""
+    """Return keys of [start] that at_trim determines and that are given, or that at_trim needs and that are
+    missing.
+    """
     table = source.table.get("start", {})
     if not start.get("at_trim", False) or not isinstance(table, Mapping):
         return []
@@ -208,7 +210,7 @@ def _start(start: Mapping[str, Any], prescribed: Motion | None) -> Start:
 
 
 def check_steps(source: Source, run: Mapping[str, float], start: Mapping[str, float]) -> list[Problem]:
-    """Return what does not fit in [run] and [start], as far as their numbers are good by themselves.
+    """Return the inconsistencies of [run] and [start], as far as their numbers are valid by themselves.
 
     Args:
         source: the trial file, for the lines in messages.
@@ -248,7 +250,7 @@ def _vectors(lists: Mapping[str, list[float]], names: list[str], count: int) -> 
 
 
 def _read_water(source: Source) -> Read:
-    """Return the uniform current, and what is added to it by depth."""
+    """Return the uniform current, and the profile that is added to it by depth."""
     values, problems = check_section(source, "water", source.table.get("water", {}))
     current = tuple(float(values.get(name, 0.0)) for name in CURRENT)
     fields = {"current": current, "sea_bed": float(values.get("sea_bed_m", 0.0))}
@@ -274,7 +276,7 @@ def _check_profile(source: Source, lists: Mapping[str, list[float]]) -> list[Pro
         return [source.problem("water.depth_m", why, "Add profile_north_m_s, profile_east_m_s, or both.")]
     depth = lists.get("depth_m")
     if depth is None:
-        return []  # its own problem has been told
+        return []  # a problem of its own has been reported
     problems = [
         source.problem(
             f"water.{name}",
@@ -292,7 +294,7 @@ def _check_profile(source: Source, lists: Mapping[str, list[float]]) -> list[Pro
 
 
 def _read_winch(source: Source) -> Read:
-    """Return what turns the drum."""
+    """Return the winch or the free drum."""
     if "winch" not in source.table:
         return {}, []
     values, problems = check_section(source, "winch", source.table["winch"])
@@ -347,7 +349,7 @@ def _read_vessel(source: Source) -> Read:
 
 
 def check_scheme(source: Source, run: Mapping[str, Any], cable: Mapping[str, float]) -> list[Problem]:
-    """Return what a trial and its cable ask for that only the default scheme knows, if [run] asks for another one."""
+    """Return features of a trial and its cable that only the default scheme has, if [run] asks for another one."""
     scheme, table = run.get("scheme", SCHEMES[0]), source.table
     if scheme == SCHEMES[0]:
         return []

@@ -1,4 +1,4 @@
-"""What a vehicle is told, as it stands in files: columns of numbers over time, inline in the trial or in a CSV file.
+"""The instructions of a vehicle in files: columns of numbers over time, inline in the trial or in a CSV file.
 
 Inline lists are *switch points*: the last value holds to the end of the run. The rows of a CSV file are *samples of
 a log*: a row of a file holds until the next, the last one for one sampling interval more, at most 1 s (`LONGEST_HOLD`).
@@ -47,7 +47,7 @@ LEFT_OPEN = ("depth_m", "wet_length_m", "drum_north_m", "drum_east_m", "drum_dow
 """Keys of [start] that a prescribed motion leaves open; the depth unless the motion says it."""
 
 Given = Mapping[str, str | Path]
-"""``commands`` or ``motion`` → a CSV file that replaces what the trial says."""
+"""``commands`` or ``motion`` → a CSV file that replaces the section of the trial."""
 
 LONGEST_HOLD = 1.0
 """The last row of a log is believed for no longer than this: a vehicle turns by tens of degrees in it. [s]"""
@@ -76,11 +76,11 @@ class Samples:
 
     Attributes:
         file: the file as the user named it.
-        key: what messages call the column of times.
+        key: name of the column of times in messages.
         columns: column → values, in the units of the file.
         lines: the line of each sample in a CSV file; None in an inline list, where `key_line` is meant.
         key_line: line of the list of times in a trial file.
-        interpolation: what a motion asks for, see `Motion`.
+        interpolation: interpolation of a motion, see `Motion`.
     """
 
     file: str
@@ -155,7 +155,9 @@ def _check_kinds(source: Source, kinds: list[str], given: Given) -> list[Problem
 
 
 def _check_start(source: Source, samples: Samples | None) -> list[Problem]:
-    """Return what [start] says beside a prescribed motion, though the motion says it already, or has no actuators."""
+    """Return keys of [start] that are not allowed with a prescribed motion: the motion gives them, or has no
+    actuators.
+    """
     start = source.table.get("start", {})
     why, remedy = "the prescribed motion says how the run starts", "Leave it out, and set it in [motion]."
     known = {quantity.name for quantity in START} | {"at_trim"}
@@ -203,7 +205,7 @@ def check_times(samples: Samples, duration: float | None) -> list[Problem]:
     """Return the problems of the times: they start at 0, increase, and a log lasts as long as the run.
 
     Args:
-        samples: what was read.
+        samples: the samples that were read.
         duration: how long the run lasts; None if that is not known, because it is wrong itself. [s]
     """
     time = samples.time
@@ -223,7 +225,7 @@ def check_times(samples: Samples, duration: float | None) -> list[Problem]:
 
 
 def check_motion(samples: Samples) -> list[Problem]:
-    """Return what does not fit in the columns of a motion, each by itself right."""
+    """Return the inconsistencies of the columns of a motion, each valid by itself."""
     names = {name: quantity.name for name, quantity in by_field(MOTION).items()}
     given = [name for name, column in names.items() if column in samples.columns]
     section = "" if samples.lines else "motion."
@@ -240,7 +242,7 @@ def check_motion(samples: Samples) -> list[Problem]:
 
 
 def _check_smooth(samples: Samples, duration: float | None) -> list[Problem]:
-    """Return what is not known of a smooth motion: a gap, and what comes behind its last sample."""
+    """Return the problems of a smooth motion where it is not known: at a gap, and after its last sample."""
     time = np.asarray(samples.time, dtype=float)
     at = gap_at(time)
     problems = [] if at is None else [samples.problem(at, *gap_in_words(time, at))]
@@ -332,7 +334,7 @@ def _whole(header: list[str], rows: list[Row]) -> list[Row]:
 def _columns(
     name: str, header: list[str], rows: list[Row], quantities: Iterable[Quantity]
 ) -> tuple[dict[str, list[float]], list[Problem]]:
-    """Return the columns we know, NaN where a cell cannot be used, and the problems of those cells."""
+    """Return the known columns, NaN where a cell cannot be used, and the problems of those cells."""
     columns: dict[str, list[float]] = {}
     problems: list[Problem] = []
     for quantity in quantities:

@@ -21,7 +21,7 @@ import numpy as np
 WRITTEN = 2e-5
 """Numbers that differ by less than this share are the same: a log has five digits or more. [-]"""
 FEWEST = 6
-"""Fewer measurements do not tell how they were sampled. [-]"""
+"""Fewer measurements do not show how they were sampled. [-]"""
 NEW_SHARE = 0.5
 """At least this share of the m-th rows has to be new: commands that step now and then are not held measurements. [-]"""
 

@@ -1,4 +1,4 @@
-"""What a trial file may say: pydantic models made from the table of quantities, which speak in our words.
+"""The schema of a trial file: pydantic models made from the table of quantities, with messages in our words.
 
 Only here is pydantic imported, and only when a file is read. Every section is checked by itself, so a mistake
 in one does not hide those in another. Checks that compare several values live in `scenarios.reader`.
@@ -30,7 +30,7 @@ CHOICES = {
 
 
 class Page(BaseModel):
-    """A whole trial file; what the sections hold is checked by `check_section`."""
+    """A whole trial file; the contents of the sections are checked by `check_section`."""
 
     model_config = STRICT
 
@@ -96,7 +96,7 @@ def check_section(source: Source, name: str, raw: object) -> tuple[dict[str, Any
     Args:
         source: the file, for the lines in messages.
         name: one of `SECTIONS`.
-        raw: what the file says.
+        raw: the contents of the file.
 
     Returns:
         its values, in the units of the file, as far as they are good; and the problems.
@@ -142,7 +142,7 @@ def _problem(
 def _explain(
     kind: str, name: str, section: str, allowed: list[str], quantities: Mapping[str, Quantity]
 ) -> tuple[str, str]:
-    """Return why a value cannot be, and what to do."""
+    """Return why a value is not possible, and the remedy."""
     where = f"[{section}]" if section else "a trial file"
     limits = quantities[name].allowed if name in quantities else ""
     if kind == "extra_forbidden":

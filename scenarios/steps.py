@@ -39,7 +39,7 @@ Numbers = Mapping[str, float]
 
 
 class Misfit(NamedTuple):
-    """A number that does not fit the others: its field, the value, why, and what to do."""
+    """A number that does not fit the others: its field, the value, the reason, and the remedy."""
 
     field: str
     found: float
@@ -48,7 +48,7 @@ class Misfit(NamedTuple):
 
 
 def misfits(numbers: Numbers, words: Mapping[str, str] | None = None) -> list[Misfit]:
-    """Return what does not fit; `words` says how messages call the fields."""
+    """Return the inconsistencies; `words` gives the names of the fields in messages."""
     words = words or {name: name for name in numbers}
     checks = {
         ("cable_step", "hull_step"): _not_whole,

@@ -1,8 +1,8 @@
-"""What a trial is, as values: everything a run needs, checked, in SI units and radians.
+"""A trial as values: everything a run needs, checked, in SI units and radians.
 
 A `Trial` comes from `scenarios.load`. To change one, make a new one, with `Trial.with_changes` or
 ``dataclasses.replace(trial, duration=60.0)``: values are checked where they are made, with the limits of the files, and
-a `ScenarioError` tells all that is wrong. Propeller speeds are in revolutions per second, the one unit here that is not
+a `ScenarioError` reports all problems. Propeller speeds are in revolutions per second, the one unit here that is not
 SI.
 
 Signs: axes are north-east-down; depth is positive down; heading runs clockwise from north; a positive rudder
@@ -44,7 +44,7 @@ ONLY_DEFAULT = "the paper's scheme knows a limp cable on a free drum on the shor
 
 
 def only_default(asked: list[str]) -> str:
-    """Return what to do about things that only the default scheme knows."""
+    """Return the remedy for features that only the default scheme has."""
     return f'Set scheme = "{SCHEMES[0]}", or leave out {" and ".join(asked)}.'
 
 
@@ -63,7 +63,7 @@ FOUND_BY_TRIM = (
     "stern_plane_port_angle",
     "stern_plane_starboard_angle",
 )
-"""Fields of a start that a start in trim leaves no room for."""
+"""Fields of a start that may not be given with a start in trim."""
 FOUND_WHY = "a start with at_trim finds it"
 TRIM_NEEDS_SPEED = "a start with at_trim holds a forward speed: fins need a flow"
 
@@ -87,8 +87,8 @@ class Start:
         rudder_angle: where the rudder stands; a servo without lag and rate limit stands as commanded. [rad]
         stern_plane_port_angle: the same of the port stern-plane. [rad]
         stern_plane_starboard_angle: the same of the starboard stern-plane. [rad]
-        at_trim: begin in the steady level motion at this surge speed, depth and wet length, which says the pitch, the
-            other speeds and what actuators hold it; commands stay those of the trial.
+        at_trim: begin in the steady level motion at this surge speed, depth and wet length, which determines the
+            pitch, the other speeds and the actuators that hold it; commands remain those of the trial.
         wet_length: cable already in the water, laid straight behind the vehicle. [m]
         drum_north: where the drum is from the tow point, northwards: the cable then hangs at rest between them. [m]
         drum_east: the same, eastwards. [m]
@@ -116,7 +116,7 @@ class Start:
     drum_down: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no start."""
+        """Raise an error if the fields do not form a start."""
         check = Checks(self)
         check.numbers(START_FIELDS)
         if check.kind("at_trim", (bool,)) and self.at_trim:
@@ -165,7 +165,7 @@ class Profile:
     velocity: tuple[tuple[float, float, float], ...]
 
     def __post_init__(self) -> None:
-        """Refuse what is no profile."""
+        """Raise an error if the fields do not form a profile."""
         check = Checks(self)
         depth = check.rows("depth", PROFILE[:1])
         velocity = check.rows("velocity", PROFILE[1:], None if depth is None else depth.size)
@@ -177,7 +177,7 @@ class Profile:
 
 @dataclass(frozen=True, kw_only=True)
 class Winch:
-    """What turns the drum, linear between the times; after the last one the last value holds.
+    """The winch that turns the drum, linear between the times; after the last one the last value holds.
 
     Attributes:
         control: one of `CONTROLS`.
@@ -190,7 +190,7 @@ class Winch:
     setpoint: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse what is no winch."""
+        """Raise an error if the fields do not form a winch."""
         check = Checks(self)
         if not isinstance(self.control, str) or self.control not in CONTROLS:
             check.say("control", "a winch cannot do this", f"Allowed: {', '.join(CONTROLS)}.", self.control)
@@ -220,7 +220,7 @@ class Vessel:
     velocity: tuple[tuple[float, float, float], ...]
 
     def __post_init__(self) -> None:
-        """Refuse what is no vessel."""
+        """Raise an error if the fields do not form a vessel."""
         check = Checks(self)
         time = check.rows("time", VESSEL[:1])
         velocity = check.rows("velocity", VESSEL[1:], None if time is None else time.size)
@@ -244,7 +244,7 @@ def _keep(value: Any, **fields: Any) -> None:
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """A vehicle on a cable in water, and what it is told to do; one of `commands` and `motion` is None.
+    """A vehicle on a cable in water, and its instructions; one of `commands` and `motion` is None.
 
     Attributes:
         name: name of the shipped scenario, or of the user's file without its ending.
@@ -270,11 +270,11 @@ class Trial:
         tolerances: dotted name of a number of vehicle, cable or drum → how far a healthy vehicle may be from it, of
             those whose file or trial says so; one standard deviation, in the number's unit.
         current: velocity of the water, north, east, down, the same everywhere. [m/s]
-        profile: what is added to it by depth.
+        profile: velocity of the water that is added to it by depth.
         sea_bed: depth of a flat sea bed, which a run that goes below it warns of; 0 is not known. [m]
-        winch: what turns the drum; None for a free drum.
+        winch: the winch that turns the drum; None for a free drum.
         vessel: how the drum moves; None for a drum on the shore.
-        commands: what the actuators are told.
+        commands: the commands to the actuators.
         motion: the prescribed motion.
     """
 
@@ -307,7 +307,7 @@ class Trial:
     motion: Motion | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what is no trial."""
+        """Raise an error if the fields do not form a trial."""
         check = Checks(self)
         for name in ("name", "description", "text", "source"):
             check.kind(name, (str,))
@@ -342,7 +342,7 @@ class Trial:
         return max(1, round(self.every / self.cable_step))
 
     def with_changes(self, changes: Mapping[str, float | Sequence[float]]) -> Trial:
-        """Return a trial with other values for some of its numbers; this one stays as it is.
+        """Return a trial with other values for some of its numbers; this one is not changed.
 
         >>> import scenarios
         >>> thick = scenarios.load("fig6").with_changes({"cable.diameter": 0.003, "start.heading_deg": 90.0})
@@ -377,7 +377,7 @@ class Trial:
         return self._overview().html()
 
     def _overview(self) -> Overview:
-        """Return what it is, how long it lasts, how it starts, and what the vehicle is told."""
+        """Return the kind of trial, its duration, its start, and the instructions of the vehicle."""
         start, cable = self.start, self.cable
         heading, speed = np.degrees(start.heading), start.surge_speed
         reported = self.commands if self.commands is not None else self.motion

@@ -34,7 +34,7 @@ def run() -> None:
     except KeyboardInterrupt:  # before the command line was ready, or while it said so
         interrupts.print_interrupted()
         code = interrupts.INTERRUPTED
-    gc.freeze()  # what is left goes with the process: to take it apart first takes a second
+    gc.freeze()  # the remaining objects go with the process: to take them apart first takes a second
     interrupts.leave(code)
 
 

@@ -1,12 +1,13 @@
-"""Refuse an argument of another kind than a function declares, in one sentence, before the function begins.
+"""Raise an error, in one sentence, for an argument of another kind than a function declares, before the function
+begins.
 
     @checked_arguments
     def simulate(scenario: str | Path | Trial, *, progress: Progress | None = None) -> Dataset: ...
 
     simulate("fig6", progress=[])   simulate: progress is []; it must be a function of 1 argument or None.
 
-The annotations say what is allowed; there is no other table. Whether a number is within its limits is for the function
-to say (`subzero.errors.checked`).
+The annotations define the allowed arguments; there is no other table. Whether a number is within its limits is
+checked by the function (`subzero.errors.checked`).
 
 Why no library: pydantic copies and converts what it checks; beartype looks at one item of a list, and at no signature
 of a callback; typeguard imports for 0.2 s, and refuses numpy's numbers and arrays. None knows names that a module
@@ -70,7 +71,7 @@ def checked_arguments(made: Made) -> Made:
 
 
 def check_is_run(owner: str, run: Any) -> None:
-    """Refuse a dataset that is no run.
+    """Raise an error if a dataset is not a run.
 
     Raises:
         BadValueError: it does not say which scenario was simulated.
@@ -93,7 +94,7 @@ class _Names(dict[str, Any]):
 
 @functools.cache
 def _hints(function: Callable[..., Any]) -> dict[str, Any]:
-    """Return argument → what it may be, of the arguments that have a place or a name of their own."""
+    """Return argument → its allowed kinds, for the arguments that have a place or a name of their own."""
     several = inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD
     annotated = {
         name: parameter.annotation
@@ -105,7 +106,7 @@ def _hints(function: Callable[..., Any]) -> dict[str, Any]:
 
 
 def _is_list(value: Any) -> bool:
-    """Say whether a value is a list, a tuple, an array or their like, that is not endless."""
+    """Return whether a value is a list, a tuple, an array or their like, that is not endless."""
     try:
         is_list = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes)
         return is_list and len(value) <= MOST_ITEMS
@@ -114,7 +115,7 @@ def _is_list(value: Any) -> bool:
 
 
 def _is_series(value: Any) -> bool:
-    """Say whether a value is a list, or gives items in another way: a set, a mapping, a generator."""
+    """Return whether a value is a list, or gives items in another way: a set, a mapping, a generator."""
     is_other = isinstance(value, Iterable) and not isinstance(value, Sequence | np.ndarray)
     return is_other or _is_list(value)
 
@@ -134,11 +135,11 @@ _KINDS: dict[Any, tuple[str, Callable[[Any], bool]]] = {
     **dict.fromkeys((Sequence, list, tuple, np.ndarray), ("a list", _is_list)),
     Iterable: ("a list", _is_series),
 }
-"""Kind → what it is called, and whether a value is one; any other kind is a class."""
+"""Kind → its name in messages, and whether a value is of it; any other kind is a class."""
 
 
 def _fits(value: Any, hint: Any) -> bool:
-    """Say whether a value is of an annotated kind."""
+    """Return whether a value is of an annotated kind."""
     kind, inside = typing.get_origin(hint) or hint, typing.get_args(hint)
     if kind in (typing.Union, UnionType):
         return any(_fits(value, part) for part in inside)
@@ -160,7 +161,7 @@ def _fits(value: Any, hint: Any) -> bool:
 
 
 def _takes(function: Any, arguments: Collection[Any]) -> bool:
-    """Say whether a value can be called with so many arguments, as far as Python knows."""
+    """Return whether a value can be called with so many arguments, as far as Python knows."""
     try:
         inspect.signature(function).bind(*arguments)
     except TypeError:
@@ -171,7 +172,7 @@ def _takes(function: Any, arguments: Collection[Any]) -> bool:
 
 
 def _words(hint: Any) -> str:
-    """Return what an annotation asks for, in words."""
+    """Return the kind that an annotation asks for, in words."""
     kind, inside = typing.get_origin(hint) or hint, typing.get_args(hint)
     if kind in (typing.Union, UnionType):
         return " or ".join(dict.fromkeys(map(_words, inside)))

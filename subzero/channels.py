@@ -2,7 +2,7 @@
 
 A channel has one name everywhere: in the dataset (`surge_speed`), in a CSV file with its unit behind it
 (`surge_speed_m_s`), in a measured record, a figure, a report. Results carry the *display* unit of this table
-(degrees, rev/s), so what is read from a file is what is seen in a figure; ``scale`` leads there from SI.
+(degrees, rev/s), so the numbers in a file are those in a figure; ``scale`` converts to it from SI.
 
 Signs: axes are north-east-down for the earth and forward-starboard-down for the body. Depth is positive
 down, heading runs clockwise from north and is continuous (no jump at 360 degrees), a positive rudder
@@ -48,9 +48,10 @@ STANDARD_NAMES = {
 
 
 COLUMN_STEMS = {"roll_angle": "roll"}
-"""Channel → what its column is called before the unit, where that is not its name.
+"""Channel → name of its column without the unit, where that is not its own name.
 
-``run.roll`` is a method of xarray, so the variable is ``roll_angle``; the column ``roll_deg`` hides nothing, and stays.
+``run.roll`` is a method of xarray, so the variable is ``roll_angle``; the column ``roll_deg`` hides nothing, and is
+kept.
 """
 
 RENAMED_CHANNELS = {"roll": "roll_angle"}
@@ -65,7 +66,7 @@ class Channel:
         name: name in datasets and in the API.
         unit: display unit, in which results carry it.
         symbol: symbol of the source, for the axis of a figure (matplotlib mathtext).
-        long_name: what it is, in words, with its sign where there are two.
+        long_name: its name in words, with its sign where there are two.
     """
 
     name: str
@@ -90,7 +91,9 @@ class Channel:
 
     @property
     def attributes(self) -> dict[str, str]:
-        """What a variable of a dataset carries: units, long name, symbol, and CF's standard name where it has one."""
+        """The attributes of a variable of a dataset: units, long name, symbol, and CF's standard name where it has
+        one.
+        """
         named = {"standard_name": STANDARD_NAMES[self.name]} if self.name in STANDARD_NAMES else {}
         return {"units": self.unit, "long_name": self.long_name, "symbol": self.symbol, **named}
 
@@ -181,14 +184,14 @@ class AnyRun(Protocol):
 
     @property
     def attrs(self) -> dict[Any, Any]:
-        """Where it came from, how it ended, and what may be wrong with it."""
+        """Its provenance, its outcome, and the warnings."""
 
     def __getitem__(self, name: str, /) -> Any:
         """Return a variable; its ``values`` are an array."""
 
 
 class Observation(NamedTuple):
-    """What is true at one time, by the names of `CHANNELS`, in SI units, radians and rev/s.
+    """The true values at one time, by the names of `CHANNELS`, in SI units, radians and rev/s.
 
     The roll angle is `roll` here, ``roll_angle`` there, where `roll` is a method of xarray. The heading is continuous:
     no jump at a full turn. Forces and moments of the cable are those on the hull, body axes.

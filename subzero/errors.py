@@ -1,4 +1,4 @@
-"""What a user can do wrong, told in one clean message (exit code 2 on the command line).
+"""Errors that a user can cause, each reported in one clean message (exit code 2 on the command line).
 
 A message has three parts: *what* was found (file, line or name, value), *why* it cannot be, and *what to do*.
 Only the command line catches `UserError`; anything else that is raised is a bug of ours and keeps its
@@ -28,11 +28,11 @@ SHOWN_PROBLEMS = 12
 """So many problems of one file are spelt out: enough to repair it, few enough to read on one screen."""
 
 LONGEST_PROBLEM = 1000
-"""A problem is cut behind so many characters: a file may hold a key of any length."""
+"""A problem is cut after so many characters: a file may hold a key of any length."""
 
 
 class UserError(Exception):
-    """Something in the request or in a file of the user cannot be used; the message says what to do."""
+    """Something in the request or in a file of the user cannot be used; the message gives the remedy."""
 
 
 class BadValueError(UserError, ValueError):
@@ -40,7 +40,7 @@ class BadValueError(UserError, ValueError):
 
 
 def foreign_package() -> str:
-    """Return what is wrong where Python finds another package by the name of one of ours; empty if nothing is."""
+    """Return a message if Python finds another package by the name of one of ours; empty if it does not."""
     for name, beginning in OUR_PACKAGES.items():
         spec = find_spec(name)
         origin = spec.origin if spec else None
@@ -83,7 +83,7 @@ def checked(
     Args:
         owner: whose value, such as ``CableProperties``; empty for an argument of a function.
         name: its name.
-        value: what was given.
+        value: the value that was given.
         least: lower limit, allowed itself.
         most: upper limit, allowed itself.
         above: a lower limit that is not allowed itself.
@@ -106,7 +106,7 @@ def checked(
 
 
 def truth(name: str, value: object) -> bool:
-    """Return a truth value, Python's or numpy's, or refuse what is none: what is meant by 0.5 nobody can know.
+    """Return a truth value, Python's or numpy's; raise an error for anything else, since 0.5 would be ambiguous.
 
     Raises:
         BadValueError: neither True nor False.
@@ -117,7 +117,7 @@ def truth(name: str, value: object) -> bool:
 
 
 def whole(name: str, value: object, *, least: int = 0) -> int:
-    """Return a whole number, such as a seed, or refuse what is none.
+    """Return a whole number, such as a seed; raise an error for anything else.
 
     Raises:
         BadValueError: no whole number, or one below `least`.
@@ -128,7 +128,7 @@ def whole(name: str, value: object, *, least: int = 0) -> int:
 
 
 def chosen(table: Mapping[str, Line], name: object, what: str) -> Line:
-    """Return a line of a table by its name, or say what there is.
+    """Return a line of a table by its name; raise an error that lists the names if there is none.
 
     Raises:
         UserError: the table has no such line.
@@ -141,19 +141,19 @@ def chosen(table: Mapping[str, Line], name: object, what: str) -> Line:
 
 
 def missing_extra(what: str, libraries: str, extra: str) -> UserError:
-    """Return the error of a feature whose libraries are not installed: what needs them, and how to get them."""
+    """Return the error of a feature whose libraries are not installed: the feature, and how to install them."""
     return UserError(f"{what} needs {libraries}: pip install '{DISTRIBUTION}[{extra}]'.")
 
 
 SHOWN_CHARACTERS = 60
-"""Longer values are cut, so that a message stays readable whatever was given."""
+"""Longer values are cut, so that a message remains readable for any value."""
 
 
 def short(value: object) -> str:
     """Return a value as it is shown in a message: `repr`, on one line, cut when long."""
     try:
         text = repr(value)
-    except Exception:  # whatever somebody's __repr__ does
+    except Exception:  # a user's __repr__ may do anything
         is_number = isinstance(value, Integral)  # one of thousands of digits has no text
         return "a number far too long" if is_number else f"a value of type {type(value).__name__}"
     text = " ".join(text.split())
@@ -186,7 +186,7 @@ def listed(title: str, problems: list[str]) -> str:
 
 
 def printable(text: str) -> str:
-    """Return a text that any terminal, file and figure can take: what does not print becomes an escape.
+    """Return a text that any terminal, file and figure can take: unprintable characters become escapes.
 
     Control characters could move the cursor or recolour a terminal; bytes of a file name that are not UTF-8 cannot be
     written into a file.

@@ -38,7 +38,7 @@ class Feature:
     Attributes:
         factors: three names of FACTORS.
         unit: of a coefficient, per newton (or per newton metre): "s2/m2" makes N s2/m2; "1" leaves N.
-        words: what it is.
+        words: its description.
     """
 
     factors: tuple[str, str, str]
@@ -97,7 +97,7 @@ class Term:
     coefficient: float
 
     def __post_init__(self) -> None:
-        """Refuse what is not in the tables."""
+        """Raise an error for a name that is not in the tables."""
         for word, known in ((self.axis, AXES), (self.feature, tuple(FEATURES))):
             if not isinstance(word, str) or word not in known:
                 raise BadValueError(
@@ -135,7 +135,7 @@ class MissingForce:
     terms: tuple[Term, ...] = ()
 
     def __post_init__(self) -> None:
-        """Refuse a history that cannot be one."""
+        """Raise an error if the fields do not form a history."""
         try:
             time, wrench = np.array(self.time), np.array(self.wrench)
         except (ValueError, TypeError, OverflowError):

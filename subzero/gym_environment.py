@@ -32,7 +32,7 @@ from subzero.simulation.stepper import RunStoppedError, Simulator
 try:
     import gymnasium
     import gymnasium.vector
-except ImportError as missing:  # pragma: no cover - told to the user
+except ImportError as missing:  # pragma: no cover - reported to the user
     raise missing_extra("The environment", "Gymnasium", "gym") from missing
 
 ENVIRONMENT = "subzero/TetheredHeading-v0"
@@ -57,9 +57,9 @@ LIMITS = {
     "rudder angle [rad]": (-1.0, 1.0),
     "cable length [m]": (0.0, 1000.0),
 }
-"""What is observed, in this order, with the limits of the observation space."""
+"""The observed channels, in this order, with the limits of the observation space."""
 TRUTH = ("wanted_heading", *Observation._fields)
-"""What an info holds: the heading that is wanted [rad], and all that is true."""
+"""The contents of an info: the reference heading [rad], and the true values."""
 
 
 class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -69,7 +69,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
     300 steps; it ends early only if the simulation cannot go on.
 
     Args:
-        scenario: where the vehicle starts, with what cable; its commands are not used.
+        scenario: the start of the vehicle, and its cable; its commands are not used.
         propeller_rps: constant propeller command. [rev/s]
         tethered: with the cable.
         sample_time: of an action. [s]
@@ -169,7 +169,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
 
     @property
     def felt(self) -> tuple[float, ...]:
-        """What the agent sees, before it is cut to the limits of its space: the values of `LIMITS`."""
+        """The observation of the agent, before it is cut to the limits of its space: the values of `LIMITS`."""
         error, seen = self._wanted - self.seen.heading, self.seen
         return (sin(error), cos(error), seen.yaw_rate, seen.surge_speed, seen.rudder_angle, seen.cable_length)
 
@@ -179,7 +179,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         return (self._wanted, *self.seen)
 
     def _observed(self) -> np.ndarray:
-        """Return what the agent sees, within the limits of its space."""
+        """Return the observation of the agent, within the limits of its space."""
         space: Any = self.observation_space
         return np.clip(np.array(self.felt, dtype=np.float32), space.low, space.high)
 
@@ -189,7 +189,9 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
 
 
 def _shares(actions: Any, count: int) -> list[float]:
-    """Return so many rudders, each as a share of its limit, or refuse what are none; plain code, as it is in loops."""
+    """Return so many rudders, each as a share of its limit; raise an error for others; plain code, as it is in
+    loops.
+    """
     try:
         if not isinstance(actions, Sequence) or len(actions) == count:
             given = np.asarray(actions)
@@ -242,7 +244,7 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
 
     @staticmethod
     def _held_one(env: TetheredHeading, rudder: float, is_over: bool) -> tuple[float, bool]:
-        """Step one environment, or let it begin again where its episode is over."""
+        """Step one environment, or start it again where its episode is over."""
         if is_over:
             env.reset()
             return 0.0, False
@@ -250,7 +252,7 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         return env.reward(rudder), stopped
 
     def _observed(self) -> np.ndarray:
-        """Return what the agents see, within the limits of their space (num_envs, 6)."""
+        """Return the observations of the agents, within the limits of their space (num_envs, 6)."""
         space: Any = self.observation_space
         return np.clip(np.array([our.felt for our in self._ours], dtype=np.float32), space.low, space.high)
 
@@ -260,7 +262,7 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         return values | {f"_{name}": np.ones(self.num_envs, dtype=bool) for name in TRUTH}
 
     def close_extras(self, **kwargs: Any) -> None:
-        """Let the threads end."""
+        """End the threads."""
         super().close_extras(**kwargs)
         self._pool.shutdown()
 

@@ -42,8 +42,8 @@ class Model:
         cable: the cable.
         drum: the drum, free unless a winch turns it.
         current: velocity of the water, north, east, down, the same everywhere. [m/s]
-        profile: what is added to the current by depth.
-        winch: what turns the drum; None for a free drum.
+        profile: velocity of the water that is added to the current by depth.
+        winch: the winch that turns the drum; None for a free drum.
         vessel: how the drum moves; None for a drum on the shore.
         missing: a force that all of these lack; None for nothing.
     """
@@ -91,7 +91,7 @@ class Model:
         }
 
     def water(self) -> Current:
-        """Return how the water moves: the uniform current, and what is added to it by depth."""
+        """Return the motion of the water: the uniform current, and the profile that is added to it by depth."""
         return _water_of(self.current, self.profile)
 
 
@@ -108,7 +108,7 @@ def model_of(trial: scenarios.Trial, model: object = None) -> Model:
     """Return the model that a trial describes, or another one that is given.
 
     Raises:
-        UserError: what is given is no model.
+        UserError: the given object is not a model.
     """
     if model is None:
         return Model.of(trial)
@@ -161,7 +161,7 @@ def load(
 
 
 def _complaints(numbers: Mapping[str, Any]) -> Iterable[Any]:
-    """Return what the vehicle's own equations find wrong with its numbers."""
+    """Return the problems that the vehicle's own equations find with its numbers."""
     try:
         from_mapping(numbers)
     except VehicleError as error:

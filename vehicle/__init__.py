@@ -1,4 +1,4 @@
-"""The vehicle: a rigid hull in water with propeller, linked rudders and two stern-planes; it knows no cable.
+"""The vehicle: a rigid hull in water with propeller, linked rudders and two stern-planes; independent of any cable.
 
 Everything is SI. Body axes point forward, to starboard and down from the hull centre; earth axes north, east,
 down. Signs: positive rudder turns the heading to starboard (increasing), positive stern-plane (both) pitches

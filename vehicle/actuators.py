@@ -6,11 +6,12 @@
     δ'     = clip((target − seen)/lag, ± rate limit)
     fin    = δ, dragged behind by half the backlash of the linkage
 
-The servo turns until it sees the angle that it is told. Without position feedback, k = 0, it sees its own shaft, and
+The servo turns until it sees the commanded angle. Without position feedback, k = 0, it sees its own shaft, and
 dead band, offset and play stand between the command and the fin. With k = 1 it sees the fin itself, which ends where it
 was commanded: "feeding back the actual positions of the control fins to their servo's" (Feng and Allen, section 4.2,
 their remedy for what Fig. 6 (d) leaves unexplained). Between the two, k is the share of the error that is taken at the
-fin, and 1 − k of dead band, offset and play stays. The fin's own sensor is taken as perfect, and as fast as the servo.
+fin, and 1 − k of dead band, offset and play remains. The fin's own sensor is taken as perfect, and as fast as the
+servo.
 
 c is the share of the command that is lost on the way: a coupling that slips. With c = 1 the fin is jammed at its
 offset, and no feedback moves it.
@@ -20,7 +21,7 @@ rate limit (the fin then *is* at its target and the state merely follows), rate 
 backlash 0, position feedback 0, lost command 0. With a finite rate limit a servo still has to stop somewhere: lags
 shorter than `vehicle.state.QUICKEST` count as `QUICKEST`.
 
-Backlash is a play between servo and fin: the linkage stays where it is until the servo has taken up the
+Backlash is a play between servo and fin: the linkage does not move until the servo has taken up the
 slack. Inside a step the fin is the linkage clipped into the play around the servo; `settle` moves the linkage
 at the end of each step. For a servo that turns one way during a step this is the exact play operator.
 """
@@ -68,7 +69,7 @@ class Servo(Section):
     lost_command: float = parameter("share of the command that is lost, c; 1: jammed", "1", low=0.0, high=1.0)
 
     def numbers(self) -> ServoNumbers:
-        """Return what the compiled servo needs."""
+        """Return the numbers that the compiled servo needs."""
         return ServoNumbers(*self.values())
 
 
@@ -101,7 +102,7 @@ def fin_angle(angle: float, linkage: float, command: float, servo: ServoNumbers)
     """Return the angle of a fin in the water, from the angles of servo, linkage and command [rad].
 
     A servo without any lag or rate limit is where it comes to rest: what it sees is its target, so of the play, too,
-    the share 1 − k stays.
+    the share 1 − k remains.
     """
     if servo.lag == 0.0 and math.isinf(servo.rate_limit):
         play = (1.0 - _feedback(servo)) * servo.half_backlash

@@ -4,7 +4,7 @@
     Y = Y_vv v|v| + Y_rr r|r|,   N = N_vv v|v| + N_rr r|r|, …           (quadratic; SNAME)
 
 Subzero II uses the quadratic roll term only; everything else is zero there and switched off exactly. Vehicles
-known by such tables (REMUS 100, LAUV) put their numbers here instead of, or beside, the cross-flow strips.
+known by such tables (REMUS 100, LAUV) put their numbers here instead of, or in addition to, the cross-flow strips.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from vehicle.vehicle import Vehicle, VehicleNumbers
 
 POWERS = ("propeller", "loss", "restoring", "external")
-"""What `power` fills: thrust and reaction torque; fins, lift and drag; weight and buoyancy; from outside."""
+"""Entries that `power` fills: thrust and reaction torque; fins, lift and drag; weight and buoyancy; from outside."""
 NO_COMMAND, NO_CURRENT, NO_WRENCH = (0.0,) * 4, (0.0,) * 3, (0.0,) * 6
 
 
@@ -112,7 +112,7 @@ def _fill_rates(
     terms: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Fill out with the rate of the state, and what `evaluate` fills."""
+    """Fill out with the rate of the state, and the entries of `evaluate`."""
     rotation(state[3:7], R)
     relative_velocity(state, R, current_n, nu_r)
     # The motor first: its quotients wait for one another, and a processor sums up forces meanwhile.

@@ -60,7 +60,7 @@ class Fins(Section):
     arm: float = parameter("centre of pressure, distance from the axis", "m", low=0.0)
 
     def numbers(self, density: float) -> FinNumbers:
-        """Return what the compiled fin needs."""
+        """Return the numbers that the compiled fin needs."""
         return FinNumbers(
             self.station,
             self.arm,
@@ -88,7 +88,7 @@ def section_force(ux: float, un: float, angle: float, fin: FinNumbers) -> tuple[
 
 @inlined
 def _turned_force(ux: float, un: float, c: float, s: float, fin: FinNumbers) -> tuple[float, float]:
-    """Return what `section_force` does, from cosine and sine of the angle."""
+    """Return the same as `section_force`, from cosine and sine of the angle."""
     Vc = ux * c + un * s
     Vm = un * c - ux * s
     V2 = Vc * Vc + Vm * Vm

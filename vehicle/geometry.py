@@ -1,4 +1,4 @@
-"""The shape of the hull with its tow point, and what follows from it: volume, centre, inertia, added mass, strips.
+"""The shape of the hull with its tow point, and derived quantities: volume, centre, inertia, added mass, strips.
 
     nose   R = D/2 [1 − ((x' − a)/a)²]^(1/n),   x' from the tip, a its length
     tail   R = D/2 − (3D/(2c²) − tan θ/c) s² + (D/c³ − tan θ/c²) s³,   s from its start, c its length
@@ -152,7 +152,7 @@ def lateral_added_mass(hull: Hull, density: float) -> tuple[float, float, float]
 
 
 def fin_added_mass(hull: Hull, density: float, station: float, chord: float, tip: float) -> tuple[float, ...]:
-    """Return what a pair of fins adds to A22 [kg], A26 [kg m], A66 [kg m2], and four of them to A44 [kg m2].
+    """Return the parts of a pair of fins in A22 [kg], A26 [kg m], A66 [kg m2], and of four of them in A44 [kg m2].
 
     A slice of hull radius R with a pair of fins up to the radius a_f moves πρ(a_f² − R² + R⁴/a_f²) sideways
     (Blevins, in Prestero 2001), where the bare hull has πρR²; four fins add (2/π)ρ a_f⁴ about the axis.

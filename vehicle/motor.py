@@ -1,4 +1,4 @@
-"""The motor on its battery: how fast the propeller turns, and what that costs.
+"""The motor on its battery: how fast the propeller turns, and the charge that it takes.
 
     I  = P/(η V_full) + I_hotel,      P = 2π n Q, no less than zero
     V  = V_full − k q_e − R I,        q_e' = I
@@ -59,7 +59,7 @@ class Battery(Section):
 
 
 def motor_numbers(motor: Motor, battery: Battery) -> MotorNumbers:
-    """Return what the compiled motor needs."""
+    """Return the numbers that the compiled motor needs."""
     return MotorNumbers(*motor.values(), *battery.values())
 
 

@@ -1,9 +1,9 @@
-"""What a parameter of the vehicle is, and how a set of them is checked.
+"""The parameters of the vehicle, and the checks of a set of them.
 
 Every number of a vehicle is a field of a frozen dataclass, a `Section`, made by `parameter`: it carries its meaning,
 its unit and its hard limits (outside of which the equations make no sense; plausible ranges and provenance live
 with the values, in the vehicle's file). A section checks its numbers when it is made; `read_section` turns a plain
-mapping into one and collects what is wrong instead of stopping at the first mistake.
+mapping into one and collects all problems instead of stopping at the first.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from subzero.errors import UserError, real, short
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class Problem:
-    """One thing wrong with the numbers of a vehicle: which key, what was found, why not, what is allowed."""
+    """One problem with the numbers of a vehicle: the key, the value found, the reason, the values allowed."""
 
     key: str
     found: str
@@ -44,7 +44,7 @@ class Section:
     """A part of a vehicle: a frozen dataclass of `parameter` fields, checked when it is made."""
 
     def __post_init__(self) -> None:
-        """Refuse numbers that cannot be; raises VehicleError."""
+        """Raise VehicleError for numbers that are not possible."""
         problems = []
         for name, field in _fields(type(self)).items():
             value = getattr(self, name)
@@ -93,7 +93,7 @@ def parameter(
 
 
 def allowed_values(field: dataclasses.Field[Any]) -> str:
-    """Say in words which values a field may take, with the unit."""
+    """Return in words which values a field may take, with the unit."""
     low, high, unit = field.metadata["low"], field.metadata["high"], field.metadata["unit"]
     bounds = []
     if low > -math.inf:
@@ -104,7 +104,7 @@ def allowed_values(field: dataclasses.Field[Any]) -> str:
 
 
 def is_plainly_right(value: object, field: dataclasses.Field[Any]) -> bool:
-    """Say whether a value is a float within its limits, as most are: a tenth of the time of `check_value`."""
+    """Return whether a value is a float within its limits, as most are: a tenth of the time of `check_value`."""
     if type(value) is not float:
         return False
     limits, low = field.metadata, field.metadata["low"]
@@ -113,7 +113,7 @@ def is_plainly_right(value: object, field: dataclasses.Field[Any]) -> bool:
 
 
 def check_value(key: str, value: object, field: dataclasses.Field[Any]) -> Problem | None:
-    """Return what is wrong with one value, or None."""
+    """Return the problem with one value, or None."""
     low, high, strict = (field.metadata[name] for name in ("low", "high", "strict"))
     if type(value) is float and low < value < high:
         return None
@@ -141,7 +141,7 @@ def read_section(kind: type, section: str, values: object, problems: list[Proble
     """Make one section of a vehicle from a mapping; append to `problems`, and return None, if that fails."""
     fields = _fields(kind)
     if isinstance(values, Mapping) and values.keys() == fields.keys():
-        with suppress(VehicleError):  # then each problem is told below, by its name in the file
+        with suppress(VehicleError):  # then each problem is reported below, by its name in the file
             return kind(**values)
     if not isinstance(values, Mapping):
         allowed = "a table with " + ", ".join(fields)

@@ -2,7 +2,7 @@
 
     F = (W − B) k_b,    M = (r_G W − r_B B) × k_b,    k_b = third row of R_nb        (Fossen 2021, eq. 4.6)
 
-W = m g; B = W + net_buoyancy, so that a vehicle trimmed neutral stays neutral when its mass is changed. With
+W = m g; B = W + net_buoyancy, so that a vehicle trimmed neutral remains neutral when its mass is changed. With
 G below B the moment rights the hull: it is positive starboard-down for a hull heeled to port. Derived from
 the potential −W z(G) + B z(B), hence free of loss.
 """

@@ -20,7 +20,7 @@ QUICKEST = 0.01
 
 
 class StateEntry(NamedTuple):
-    """One entry of the state: what it is called and where it lies."""
+    """One entry of the state: its name and its place."""
 
     name: str
     symbol: str

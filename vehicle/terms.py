@@ -33,11 +33,11 @@ if TYPE_CHECKING:
     from vehicle.vehicle import VehicleNumbers
 
 INERTIAL, PROPULSION, LOSS, RESTORING, EXTERNAL = -1, 0, 1, 2, 3
-"""What a term does to the energy: nothing, or which entry of `energy.POWERS` its power belongs to."""
+"""Energy of a term: none, or the entry of `energy.POWERS` that its power belongs to."""
 
 
 class Term(NamedTuple):
-    """A named force: what it is, and which power it makes."""
+    """A named force: its name, its meaning, and the power that it belongs to."""
 
     name: str
     meaning: str

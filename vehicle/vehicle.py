@@ -85,7 +85,7 @@ class Vehicle:
     tow_point: TowPoint
 
     def __post_init__(self) -> None:
-        """Refuse parts that are none, or do not fit; raises VehicleError."""
+        """Raise VehicleError for parts that are not valid, or do not fit."""
         problems = [
             Problem(
                 key=name, found=short(getattr(self, name)), why="this is no such part", allowed=kind.__name__
@@ -98,7 +98,7 @@ class Vehicle:
             raise VehicleError(tuple(problems))
 
     def numbers(self) -> VehicleNumbers:
-        """Return what the compiled equations take, a copy that may be changed.
+        """Return the numbers of the compiled equations, a copy that may be changed.
 
         Raises:
             VehicleError: numbers so large or so small that what follows from them is not finite.
@@ -107,7 +107,8 @@ class Vehicle:
 
     @property
     def own_numbers(self) -> VehicleNumbers:
-        """What the compiled equations take, made once: for what copies it itself, as a record does of another.
+        """The numbers of the compiled equations, made once: for callers that copy it themselves, as a record does of
+        another.
 
         Raises:
             VehicleError: as of `numbers`.
@@ -151,7 +152,7 @@ class Vehicle:
 
 @lru_cache(maxsize=4)
 def _numbers_of(vehicle: Vehicle) -> VehicleNumbers:
-    """Return the numbers of one of the last few vehicles: each run of a sweep has one that is made anew, and alike."""
+    """Return the numbers of one of the last few vehicles: each run of a sweep makes an equal one again."""
     try:
         with np.errstate(all="ignore"):
             numbers = vehicle._numbers()
@@ -232,7 +233,7 @@ def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
 
 
 def inconsistencies(hull: Hull, added_mass: AddedMass) -> list[Problem]:
-    """Return what is wrong between numbers that are right by themselves."""
+    """Return the inconsistencies between numbers that are valid by themselves."""
     problems = []
     if hull.nose_length + hull.tail_length > hull.length:
         parts = f"nose {hull.nose_length:g} m and tail {hull.tail_length:g} m"

@@ -7,7 +7,7 @@ and Σ over the two nodes:
 
 is equation (22) of Feng and Allen (2004), multiplied by ΔS/2, for w = φ = ½, h = y(t_k) and K half of
 M Δy − ΔS q at t_k; it is fully implicit for w = φ = 1, K = 0; and a stage of any method with ẏ = a (y − h)
-looks the same. Multiplied by ΔS, the equations stay harmless for a short box. A box whose right node is no
+looks the same. Multiplied by ΔS, the equations remain well scaled for a short box. A box whose right node is no
 material point but the moving end s = S(t), dS/dt = −Vt (``rule.moves``), sees the change at fixed s:
 a (y − h) + Vt ∂y/∂s there.
 """
@@ -49,7 +49,7 @@ class BoxRule(NamedTuple):
 
 
 class Ends(NamedTuple):
-    """What holds at the vehicle (8) and at the drum (9)-(11)."""
+    """The conditions at the vehicle (8) and at the drum (9)-(11)."""
 
     north: float
     """Velocity of the tow point, earth axes [m/s]."""

@@ -43,7 +43,7 @@ UPDATE_TOLERANCE = 1e-9
 """Newton converges quadratically: an update of 1e-9 (relative) leaves an error near rounding."""
 RESIDUAL_FLOOR = 1e-12
 """Below this scaled residual the equations hold to rounding. A slack cable at rest gets there too, although
-its angles are not determined: they stay where they are."""
+its angles are not determined: they keep their values."""
 SMALLEST_FRACTION = 1.0 / 128.0
 MOST_ITERATIONS = 60
 LARGEST_TURN = 1.0
@@ -51,7 +51,7 @@ LARGEST_TURN = 1.0
 
 
 NOTHING = 1e-9
-"""Less cable than this [m] in a step is none: a thousandth of its diameter would be more."""
+"""Less cable than this [m] in a step counts as zero: a thousandth of its diameter would be more."""
 
 
 class NewtonReport(NamedTuple):

@@ -1,6 +1,6 @@
 """Equation (7) with a moving end: box rule in space, TR-BDF2 in time; second order in both, every step.
 
-The independent formulation (six unknowns, angles) beside the default Cartesian one; scheme "equation7".
+This independent formulation (six unknowns, angles) complements the default Cartesian one; scheme "equation7".
 
 *Space.* Nodes 0 … N−1 are material points, node N is the end s = S(t) on the drum, with dS/dt = −Vt(S) solved
 together with everything else. A last box longer than 1.5 Δs gets a node at Δs, by linear interpolation; one
@@ -8,7 +8,7 @@ shorter than 0.4 Δs loses its first node. Segment length and time step have not
 
 *Time.* TR-BDF2 (Bank and others, 1985) with γ = 2 − √2: a trapezoidal stage to t + γ Δt, then backward
 differences over t, t + γ Δt, t + Δt. Both stages read ẏ = a (y − h) with the same a = 2/(γ Δt). It is
-L-stable and stiffly accurate: the tension, which has no rate of its own, is solved anew at the end of every
+L-stable and stiffly accurate: the tension, which has no rate of its own, is solved again at the end of every
 step and does not remember (no staircase); and as the last stage differences states only, the tension is of
 second order too. SDIRK2, whose stages are of first order, gives its inertia part to first order only.
 
@@ -59,7 +59,7 @@ SLACK_TOLERANCE = 1e-6
 def solve_stage(
     w: BoxWorkspace, a: float, end_history: float, ends: Ends, c: Equation7Numbers
 ) -> NewtonReport:
-    """Solve ẏ = a (y − h) with the moving end; let the drum stand while the cable would run back."""
+    """Solve ẏ = a (y − h) with the moving end; the drum is held while the cable would run back."""
     rule = BoxRule(1.0, 1.0, a, True, end_history)
     last = w.count[0] - 1
     report = solve_boxes(w, rule, ends, c)
@@ -170,7 +170,7 @@ class MovingBoxes(NamedTuple):
 
 
 def moving_boxes(capacity: int) -> MovingBoxes:
-    """Return a cable of no length with room for `capacity` nodes; `start_moving_boxes` gives it a direction."""
+    """Return a cable of zero length with space for `capacity` nodes; `start_moving_boxes` gives it a direction."""
     return MovingBoxes(box_workspace(capacity), np.zeros((capacity, 6)), np.zeros((capacity, 6)))
 
 
@@ -188,7 +188,7 @@ def start_moving_boxes(b: MovingBoxes, north: float, east: float, down: float, f
 
 @compiled
 def fit_nodes(b: MovingBoxes, segment_length: float) -> bool:
-    """Insert or remove nodes until the last box has a fair length; False when there is no room."""
+    """Insert or remove nodes until the last box has an admissible length; return False when the arrays are full."""
     w = b.boxes
     while w.length[w.count[0] - 1] > SPLIT * segment_length:
         if w.count[0] == len(w.y):
@@ -201,7 +201,7 @@ def fit_nodes(b: MovingBoxes, segment_length: float) -> bool:
 
 @compiled
 def insert_node(b: MovingBoxes, segment_length: float) -> None:
-    """Put a material node Δs into the last box, by linear interpolation; the end stays as it is.
+    """Put a material node Δs into the last box, by linear interpolation; the end does not change.
 
     The new node does not move with the end: its rate is interpolated from that of the material at the end,
     ẏ + Vt ∂y/∂s.
@@ -221,7 +221,7 @@ def insert_node(b: MovingBoxes, segment_length: float) -> None:
 
 @compiled
 def remove_node(b: MovingBoxes) -> None:
-    """Take the last material node out; the last two boxes become one, the end stays as it is."""
+    """Remove the last material node; the last two boxes become one, the end does not change."""
     w, n = b.boxes, b.boxes.count[0]
     for i in range(6):
         w.y[n - 2, i], b.rate[n - 2, i] = w.y[n - 1, i], b.rate[n - 1, i]
@@ -230,7 +230,7 @@ def remove_node(b: MovingBoxes) -> None:
 
 
 def with_room(b: MovingBoxes, step: float, segment_length: float) -> MovingBoxes:
-    """Return the cable with room for twice what the next step can add."""
+    """Return the cable with space for twice as many nodes as the next step can add."""
     used = int(b.boxes.count[0])
     wanted = used + 8 + int(4.0 * abs(b.boxes.y[used - 1, 1]) * step / segment_length)
     if wanted <= len(b.boxes.y):

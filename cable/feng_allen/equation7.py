@@ -20,9 +20,9 @@ e = 0.
 
 Leaves out: bending stiffness, shear in the current, boundary conditions.
 
-**Slopes**, what Newton's method needs beside the matrices. For a fixed vector x the functions fill ∂(M(y) x)/∂y and
-∂(N(y) x)/∂y, shape (6, 6), row = equation, column = unknown, and ∂q/∂y. Only entries that can differ from zero are
-set, so the caller hands in arrays that were zero once. Checked against differences in
+**Slopes** are needed by Newton's method in addition to the matrices. For a fixed vector x the functions fill
+∂(M(y) x)/∂y and ∂(N(y) x)/∂y, shape (6, 6), row = equation, column = unknown, and ∂q/∂y. Only entries that can differ
+from zero are set, so the caller hands in arrays that were zero once. Checked against differences in
 ``tests/exact/test_equation7.py``.
 
 The current's local components follow the frame: ∂Jt/∂α = −Jb cosβ, ∂Jn/∂α = Jb sinβ,

@@ -1,4 +1,4 @@
-"""Run a scheme that solves equation (7) in its angles, and hand back the default scheme's `History`.
+"""Run a scheme that solves equation (7) in its angles, and return the default scheme's `History`.
 
 `Paper`: (20)-(26) as printed, `printed_scheme`. `Equation7`: our independent second-order formulation, `box_scheme`.
 Imported only when one of them is asked for, so the default scheme compiles nothing of it.
@@ -95,7 +95,7 @@ def pull_out_paper(task: PullOut, scheme: Paper) -> BoxHistory:
 
 
 def _remedy(scheme: Paper) -> str:
-    """Say what to try when a step of the paper's scheme fails."""
+    """Return the advice for a step of the paper's scheme that fails."""
     default = "the default scheme (cable.MovingEnd)"
     if scheme.reading == "drum":
         return f"reading='tangent' or {default}"
@@ -103,7 +103,7 @@ def _remedy(scheme: Paper) -> str:
 
 
 class Fixed(NamedTuple):
-    """What stays what it is during a run in boxes: segment length [m], constants of (7), the drum."""
+    """Constants of a run in boxes: segment length [m], constants of (7), the drum."""
 
     segment_length: float
     cable: Equation7Numbers
@@ -267,7 +267,7 @@ def positions_of(state: np.ndarray, length: np.ndarray, compliance: float = 0.0)
 
 
 def explain(report: NewtonReport, time: float, remedy: str) -> str:
-    """Say when, where and why a step to `time` [s] failed, and what to try."""
+    """Return when, where and why a step to `time` [s] failed, and the advice."""
     return (
         f"Stopped at {time:g} s: {OUTCOMES[report.outcome]}; worst at node {report.node}, "
         f"{ROW_NAMES[report.row]}, scaled residual {report.residual:.2g} after {report.iterations} "

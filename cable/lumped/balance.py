@@ -1,4 +1,4 @@
-"""The balance of momentum of the free nodes, with its slopes: what a node is asked for minus what it gets.
+"""The balance of momentum of the free nodes, with its slopes: required minus available force of a node.
 
     R_j = (w_j p_j − P*_j)/g + w_j f_j + T_j t_j − T_{j+1} t_{j+1} − B_j,      w_j = ½(ℓ_j + ℓ_{j+1})
 
@@ -151,7 +151,7 @@ def arm(near: float, far: float, p: int) -> float:
 def _bend(
     rope: Rope, g: float, j: int, k: int, p: int, factor: float, moment: float, by_length: float
 ) -> None:
-    """Add to node j + p what the bend at node j does along axis k."""
+    """Add to node j + p the force of the bend at node j along axis k."""
     near, far, held = rope.spring[REST, j], rope.spring[REST, j + 1], unknowns(rope)
     if j + p < 1 or j + p > held:
         return

@@ -1,8 +1,8 @@
 """A banded linear system, solved by elimination with row exchanges.
 
-Row i of `band` holds the entries of columns i − REACH … i + REACH, and room for what row exchanges fill in. REACH is
-eight: a node (three unknowns) feels its neighbours' neighbours through bending stiffness. Cost and memory grow with
-the number of unknowns.
+Row i of `band` holds the entries of columns i − REACH … i + REACH, and space for the fill-in of row exchanges. REACH
+is eight: a node (three unknowns) feels its neighbours' neighbours through bending stiffness. Cost and memory grow
+with the number of unknowns.
 """
 
 from __future__ import annotations

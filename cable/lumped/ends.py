@@ -181,7 +181,7 @@ def _along(t: np.ndarray, vector: np.ndarray) -> float:
 
 @compiled
 def _drum_law(rope: Rope, g: float, drum: DrumNumbers, pull: float) -> tuple[float, float, float]:
-    """Return what the drum's equation leaves, its slope by U, and how much of the pull it feels (0 or 1)."""
+    """Return the residual of the drum's equation, its slope by U, and how much of the pull it feels (0 or 1)."""
     U = rope.ends.payout[NEW]
     if drum.control == LENGTH:
         return 0.0, 1.0, 0.0
@@ -207,8 +207,8 @@ def turning(rope: Rope, g: float, drum: DrumNumbers) -> tuple[float, float]:
 
 @inner
 def is_first_order(rope: Rope) -> bool:
-    """Say whether cable is loose, or was so lately: then the drum is advanced to first order, over the whole step, so
-    that its force is the mean of what it takes.
+    """Return whether cable is loose, or was so lately: then the drum is advanced to first order, over the whole step,
+    so that its force is the mean of what it takes.
     """
     return rope.ends.since_loose < SMOOTH_STEPS or rope.ends.loose[MIDDLE] > 0.0
 
@@ -282,7 +282,7 @@ def _metre_load(rope: Rope, j: int, width: float, g: float, out: np.ndarray) -> 
 
 @compiled
 def _add_bending(rope: Rope) -> None:
-    """Add what bending does at the tow point, from the bend at the next node."""
+    """Add the bending force at the tow point, from the bend at the next node."""
     near, far, x = rope.spring[REST, 1], rope.spring[REST, 2], rope.position
     for i in range(3):
         bend = (x[NEW, 2, i] - x[NEW, 1, i]) / far - (x[NEW, 1, i] - x[NEW, 0, i]) / near

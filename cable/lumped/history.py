@@ -73,7 +73,8 @@ def rope_off_drum(
     wet: float,
     ahead: np.ndarray,
 ) -> Rope:
-    """Return a rope laid straight from the drum to where a course begins, with room for all that comes off on its way.
+    """Return a rope laid straight from the drum to the start of a course, with space for all the cable paid out on
+    the way.
 
     Args:
         course: of the tow point, which begins `wet` ahead of the drum.
@@ -135,7 +136,7 @@ def _run(rope: Rope, course: Course, fixed: Fixed) -> History:
 
 
 def _reason(rope: Rope, journey: Journey) -> str:
-    """Return why a run ended early: when, where, and what to try."""
+    """Return why a run ended early: when, where, and the advice."""
     held, solved = unknowns(rope), journey.solved
     if solved.worst == FULL:
         return (
@@ -159,7 +160,7 @@ MOST_HALVINGS = 12
 
 
 FULL = -1
-"""In place of the worst equation of a step: no room for more cable."""
+"""Returned in place of the worst equation of a step: no space for more cable."""
 
 
 class Course(NamedTuple):
@@ -167,7 +168,7 @@ class Course(NamedTuple):
 
     Attributes:
         times: (n,). [s]
-        values: place of the tow point (3), of the drum (3), what a winch is asked for (1): (n, 7). [m], or [N]
+        values: place of the tow point (3), of the drum (3), setpoint of a winch (1): (n, 7). [m], or [N]
         rates: their rates of change (n, 7).
     """
 
@@ -177,7 +178,7 @@ class Course(NamedTuple):
 
 
 class Fixed(NamedTuple):
-    """What stays what it is during a run, in the order in which `take_step` takes it."""
+    """Constants of a run, in the order of the arguments of `take_step`."""
 
     cable: CableNumbers
     drum: DrumNumbers
@@ -186,7 +187,7 @@ class Fixed(NamedTuple):
 
 
 class Row(NamedTuple):
-    """What is recorded at a time: force on the vehicle (3,), tension at the drum, length, positions and tensions."""
+    """The results at one time: force on the vehicle (3,), tension at the drum, length, positions and tensions."""
 
     tow_force: np.ndarray
     drum_tension: float
@@ -253,7 +254,7 @@ def _leg(course: Course, k: int, x: float) -> np.ndarray:
 
 
 def _row(rope: Rope) -> Row:
-    """Return what there is to record of the present state; tensions at nodes lie between those of the springs."""
+    """Return the results of the present state; tensions at nodes lie between those of the springs."""
     N, T = rope.ends.count, np.empty(rope.ends.count + 1)
     rest, pull = rope.spring[REST, 1 : N + 1], rope.spring[PULL, 1 : N + 1]
     at_drum = max(float(rope.ends.drum_pull), 0.0)

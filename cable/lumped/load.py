@@ -22,7 +22,7 @@ from subzero.jit import Record, inner
 FOLD = 0.3
 """δ in `shorten`."""
 STILL = 1e-12
-"""A speed that is none. [m/s]"""
+"""A lower speed counts as zero. [m/s]"""
 
 
 class NodeLoad(Record):

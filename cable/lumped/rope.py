@@ -1,4 +1,4 @@
-"""The lumped cable as arrays: nodes with half of the mass of the segments beside them, springs between.
+"""The lumped cable as arrays: nodes with half of the mass of the two adjacent segments, springs between them.
 
 Nodes run from the tow point (0) to the drum (count). Nodes 1 … count−1 are material points that move freely; node count
 is where the cable leaves the drum, or a free tail. Spring j joins nodes j−1 and j; the last one gets longer and shorter
@@ -26,7 +26,7 @@ STATE, REST, SIZE, PULL, GAIN, GAP, SLOPE, START_STRETCHED, STRETCHED_RATE = ran
 what the stage builds on for L [m], dL/dt at level OLD [m/s]."""
 MOMENTUM_RATE, START_POSITION, START_MOMENTUM, WATER, THINNING, DIRECTION, ANSWER = range(7)
 """Vectors of a node: dp/dt of the lump at level OLD [N], what the stage builds on for position [m] and momentum
-[kg m/s], J [m/s], ∂R/∂T of its balance by the tensions beside it through √(1+eT); of a spring: t and
+[kg m/s], J [m/s], ∂R/∂T of its balance by the tensions of the adjacent springs through √(1+eT); of a spring: t and
 ∂L/∂(V_j − V_{j−1}) [s]."""
 FADING = 0.5
 """τ. [s]"""
@@ -35,7 +35,7 @@ SMOOTH_STEPS = 3
 
 
 class RopeEnds(Record):
-    """What a lumped cable has once.
+    """The fields of a lumped cable that exist once.
 
     Attributes:
         count: number of springs.
@@ -51,12 +51,12 @@ class RopeEnds(Record):
         since_loose: steps since cable was last loose; no more are counted than `SMOOTH_STEPS`.
         stage_end: time of a stage from the start of the step. [s]
         payout_rate: d²S/dt² at level OLD. [m/s²]
-        start_last, start_payout: what the stage builds on. [m], [m/s]
+        start_last, start_payout: values that the stage builds on. [m], [m/s]
         drum_place, drum_velocity: of the drum at level NEW (3,). [m], [m/s]
         drum_pull: T(S). [N]
         tow_force: on the vehicle, earth axes (3,). [N]
         by_payout: ∂ℓ/∂U of the last spring; 0 where its length is prescribed. [s]
-        wanted: what a winch is asked for: length [m] or tension [N].
+        wanted: setpoint of a winch: length [m] or tension [N].
     """
 
     count: int
@@ -83,10 +83,10 @@ class RopeEnds(Record):
 
 
 class Rope(NamedTuple):
-    """The state of a lumped cable and the room to advance it; entry 0 of what springs have is unused.
+    """The state of a lumped cable and the work space to advance it; entry 0 of arrays over springs is unused.
 
     Attributes:
-        ends: what there is once.
+        ends: the fields that exist once.
         position, velocity, momentum: of the nodes (3 levels, nodes, 3); momentum is that of the lump. [m, m/s, kg m/s]
         stretched: L (3 levels, nodes). [m]
         spring: numbers of the springs (rows as named above, nodes).
@@ -110,7 +110,7 @@ class Rope(NamedTuple):
 
 
 def new_rope(capacity: int) -> Rope:
-    """Return an empty rope with room for `capacity` springs."""
+    """Return an empty rope with space for `capacity` springs."""
     n = capacity + 2
     ends = RopeEnds(
         count=1,

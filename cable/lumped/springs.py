@@ -1,4 +1,4 @@
-"""What the springs of the lumped cable do in a stage: where the nodes are, how long the springs, what they pull.
+"""The springs of the lumped cable in a stage: the places of the nodes, the lengths and the tensions of the springs.
 
 In a stage y = y* + g ẏ. With d the chord, t = d/|d| and ΔV = V_j − V_{j−1}, the length of spring j obeys
 
@@ -8,11 +8,11 @@ and ξ, its own unknown, L − ℓ (1 + ε(ξ)) = 0. Newton's step for ξ follow
 
     δξ = (L − ℓ(1 + ε) + ∂L/∂ΔV·δΔV − (1 + ε) δℓ) / (ℓ ε'),
 
-so ξ is eliminated spring by spring, and the springs may be as stiff as one likes.
+so ξ is eliminated spring by spring, and the springs may be arbitrarily stiff.
 
 The springs of the lumped cable: hardly any stretch when taut, hardly any push when slack.
 
-One number ξ [N] per spring tells both what it pulls and how long it is, so that neither side is steep:
+One number ξ [N] per spring gives both its tension and its length, so that neither side is steep:
 
     T(ξ) = ½(ξ + √(ξ² + c²)),      ε(ξ) = e T − σ(ξ),      σ(ξ) = ½(−ξ + √(ξ² + c²))/k
 
@@ -83,7 +83,7 @@ def _last_length(rope: Rope, g: float) -> None:
 
 @compiled
 def _observe_spring(rope: Rope, j: int, g: float) -> None:
-    """Fill what is known of spring j."""
+    """Fill the geometry and the tension of spring j."""
     x, V, t, rest = rope.position, rope.velocity, rope.vector[DIRECTION], rope.spring[REST, j]
     square, fading = (POINT * rest) ** 2, 1.0 / (1.0 + g / FADING)
     for i in range(3):
@@ -105,7 +105,7 @@ def _observe_spring(rope: Rope, j: int, g: float) -> None:
 
 @compiled
 def pull_nodes(rope: Rope, g: float) -> None:
-    """Add all springs to the balances of their nodes (what is asked of a node minus what it gets)."""
+    """Add all springs to the residuals of their nodes' balances (required minus available force)."""
     N, held = rope.ends.count, unknowns(rope)
     column = 3 * (N - 1)
     for j in range(1, N + 1):
@@ -194,7 +194,7 @@ def spring_state(T: float) -> float:
 
 @inner
 def drum_friction(friction: float, payout: float) -> tuple[float, float]:
-    """Return what friction holds back, C_f/R_d rounded off at rest [N], and its slope by the pay-out rate [N s/m]."""
+    """Return the friction of the drum, C_f/R_d rounded off at rest [N], and its slope by the pay-out rate [N s/m]."""
     if payout <= 0.0:
         return 0.0, friction / CREEP
     size = sqrt(payout * payout + CREEP * CREEP)

@@ -1,4 +1,4 @@
-"""How a run of the lumped cable begins: straight, in steady motion, with what the drum holds."""
+"""The initial state of the lumped cable: straight, in steady motion, with the tension that the drum holds."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def lay(
 
 
 def winch_rows(drum: DrumProperties | Winch, times: np.ndarray, wet: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return what a winch is asked for at times (n,), and its rate: dS/dt where the length is prescribed."""
+    """Return the setpoint of a winch at times (n,), and its rate: dS/dt where the length is prescribed."""
     if isinstance(drum, DrumProperties):
         return np.zeros(times.size), np.zeros(times.size)
     setpoint = drum.setpoints(times, wet)
@@ -58,7 +58,7 @@ def winch_rows(drum: DrumProperties | Winch, times: np.ndarray, wet: float) -> t
 
 
 def held_at_drum(drum: DrumProperties | Winch, setpoint: float, payout: float) -> float:
-    """Return the tension at the drum that a run starts with: a winch's, or what friction holds. [N]."""
+    """Return the tension at the drum that a run starts with: a winch's, or that of friction. [N]."""
     if isinstance(drum, DrumProperties):
         return drum.friction_torque / drum.radius if payout > 0.0 else 0.0
     return setpoint if isinstance(drum, ConstantTension) else 0.0

@@ -157,7 +157,7 @@ def begin(rope: Rope, leg: np.ndarray, c: CableNumbers, water: Water) -> None:
 
 @inner
 def start_trapezoid(rope: Rope, g: float) -> None:
-    """Fill what the first stage builds on, and guess that all goes on."""
+    """Fill the values that the first stage builds on, with constant velocities as the first guess."""
     for j in range(rope.ends.count + 1):
         for i in range(3):
             rope.vector[START_POSITION, j, i] = rope.position[OLD, j, i] + g * rope.velocity[OLD, j, i]

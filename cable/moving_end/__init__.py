@@ -4,7 +4,7 @@ The four unknowns of a segment are its tension and the place of its far node. Th
 longer one is split, a shorter one merged (`remeshing`). What may be used from outside stands in `__all__`; everything
 else of this package is its own (a contract in ``pyproject.toml`` holds it).
 
-what is computed                                              file
+subject                                                       file
 ------------------------------------------------------------  -----------------------------------------------
 the cable now, the steps before, the matrix, options          state
 momentum, drag and weight of one segment                      segment_load, chord_correction

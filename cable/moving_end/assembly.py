@@ -93,7 +93,7 @@ def assemble(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: L
 
 @compiled
 def assemble_residual(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load) -> None:
-    """Fill the residual only; the matrix, or its factors, stay as they are."""
+    """Fill the residual only; the matrix, or its factors, are not changed."""
     _fill(line, w, c, drum, work, False)
 
 

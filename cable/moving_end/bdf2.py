@@ -3,7 +3,7 @@
     df/dt (t_new) ≈ a₀ f_new + a₁ f_now + a₂ f_before
 
 Exact for quadratic polynomials. It damps the stiff part completely (the cable's sideways motion settles in
-milliseconds, far below a step) and gives the tension, which has no time derivative of its own, anew at every step:
+milliseconds, far below a step) and gives the tension, which has no time derivative of its own, again at every step:
 no staircase. The first step has no f_before. There velocities follow from positions by the trapezoidal rule, which
 needs the velocity at the start (known) and is exact for quadratic motions too,
 
@@ -47,9 +47,11 @@ def backward_weights(step: float, previous_step: float) -> Weights:
         step: t_new − t_now. [s]
         previous_step: t_now − t_before; 0 when there is no earlier value. [s]
     """
+    # Without a past: a trapezoidal rule for positions, 2Δx/Δt − V, and a first-order rate for momenta.
     if previous_step <= 0.0:
         slope = 1.0 / step
         return Weights(slope, -slope, 0.0, 2.0 * slope, -2.0 * slope, 0.0, -1.0, slope)
+    # Variable steps: the weights of the parabola through three points.
     ratio = step / previous_step
     a0 = (1.0 + 2.0 * ratio) / (step * (1.0 + ratio))
     a2 = ratio * ratio / (step * (1.0 + ratio))

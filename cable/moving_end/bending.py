@@ -6,8 +6,8 @@ The bending energy of a chain of straight segments with tangents t_j, and the sh
 
 with ℓ̄_j = ½(ℓ_j + ℓ_{j+1}) and no moment at the two ends (hinges at the vehicle and at the drum; a layer of thickness
 √(EI/T) at a clamped end is not modelled). f_j of `assembly` becomes T_j t_j − q_j; for a gently bent cable q is
-EI ∂³x/∂s³. It depends on four nodes, so a balance depends on five: the matrix gets blocks beside its three diagonals.
-ℓ̄ of the growing segment is taken from the step before. A cable without EI compiles nothing of this.
+EI ∂³x/∂s³. It depends on four nodes, so a balance depends on five: the matrix gets two blocks more than its three
+diagonals. ℓ̄ of the growing segment is taken from the step before. A cable without EI compiles nothing of this.
 
 What it does not do: a cable cannot be pushed here (`slack_law`), stiff or not. Where a winch pays out more than is
 taken, while less is in the water than the length (EI/w_c)^⅓ in which weight begins to bend it, a stiff cable would
@@ -34,7 +34,8 @@ def _add_bending(line: Line, c: StiffCableNumbers) -> None:
 
 @allocating
 def _bend(line: Line, stiffness: float) -> None:
-    """Do that for all segments."""
+    """Add bending for all segments; the compiled part of `_add_bending`."""
+    # `assemble` fills the three inner diagonals; the outer two are filled here only.
     for j in range(1, line.ends.count + 1):
         for i in range(4):
             for k in range(4):
@@ -42,6 +43,7 @@ def _bend(line: Line, stiffness: float) -> None:
                 line.blocks[UPPER2, j, i, k] = 0.0
     tangents, chords = np.empty((3, 3)), np.empty(3)
     for j in range(1, line.ends.count + 1):
+        # Segments j−1, j and j+1; those beyond the ends get zero tangents, and no moment.
         for side in range(3):
             _tangent(line, j + side - 1, side, tangents, chords)
         _add_shear(line, j, stiffness, tangents, chords)
@@ -66,6 +68,7 @@ def _spring(line: Line, j: int, stiffness: float) -> float:
     N = line.ends.count
     if j < 1 or j >= N:
         return 0.0
+    # The length of level NOW, since ℓ̄ of the growing segment is taken from the step before.
     far = line.ends.last_length[NOW] if j + 1 == N else line.length[j + 1]
     return 2.0 * stiffness / (line.length[j] + far)
 
@@ -79,6 +82,7 @@ def _add_shear(line: Line, j: int, stiffness: float, t: np.ndarray, r: np.ndarra
         m[i] = far * (t[2, i] - t[1, i]) - near * (t[1, i] - t[0, i])
         along += t[1, i] * m[i]
     for i in range(3):
+        # The part of m along the tangent is not a shear force.
         q[i] = (m[i] - along * t[1, i]) / r[1]
         _add_to_balances(line, j, i, q[i])
     before_after_0, before_after_2 = 0.0, 0.0
@@ -87,6 +91,7 @@ def _add_shear(line: Line, j: int, stiffness: float, t: np.ndarray, r: np.ndarra
         before_after_2 += t[1, i] * t[2, i]
     for i in range(3):
         for k in range(3):
+            # P projects onto the plane across segment j; A, B and C are derivatives by the chords j−1, j and j+1.
             P = (1.0 if i == k else 0.0) - t[1, i] * t[1, k]
             to_0 = P - t[0, k] * (t[0, i] - t[1, i] * before_after_0)
             to_2 = P - t[2, k] * (t[2, i] - t[1, i] * before_after_2)
@@ -98,6 +103,7 @@ def _add_shear(line: Line, j: int, stiffness: float, t: np.ndarray, r: np.ndarra
 @compiled
 def _add_to_balances(line: Line, j: int, i: int, q: float) -> None:
     """Add a component of q_j: −q to node j, +q to node j−1, −q to the tow force."""
+    # The place of the held node is known: it has no balance.
     if j < held_node(line):
         line.rows[RESIDUAL, j, 1 + i] -= q
     if j > 1:
@@ -110,6 +116,7 @@ def _add_to_balances(line: Line, j: int, i: int, q: float) -> None:
 def _add_to_matrix(line: Line, j: int, i: int, k: int, A: float, B: float, C: float) -> None:
     """Add the derivatives of a component of q_j by the chords j−1 (A), j (B) and j+1 (C)."""
     held, row, column = held_node(line), 1 + i, 1 + k
+    # A chord is the difference of two nodes, so a derivative by a chord enters the columns of both.
     if j < held:
         line.blocks[LOWER2, j, row, column] += A
         line.blocks[LOWER, j, row, column] += B - A
@@ -166,7 +173,7 @@ def _solve(line: Line, c: CableNumbers) -> bool:
 
 @inner
 def _stiff_solve(line: Line, c: StiffCableNumbers) -> bool:
-    """Do the same for five diagonals of blocks."""
+    """Solve like `_solve`, with five diagonals of blocks."""
     if factor_wide(line.blocks, line.pivots, line.ends.count) > 0:
         return False
     solve_wide(line.blocks, line.pivots, line.ends.count, line.rows[RESIDUAL])
@@ -176,13 +183,15 @@ def _stiff_solve(line: Line, c: StiffCableNumbers) -> bool:
 
 @inner
 def _has_residual(line: Line, c: CableNumbers) -> bool:
-    """Say whether a residual can be had without the matrix: not for a single segment, whose equations are its own."""
+    """Return whether a residual can be computed without the matrix: not for a single segment, which has its own
+    equations.
+    """
     return line.ends.count > 1
 
 
 @inner
 def _no_residual(line: Line, c: StiffCableNumbers) -> bool:
-    """Say no: bending fills residual and matrix at once."""
+    """Return False: bending fills residual and matrix at once."""
     return False
 
 

@@ -4,13 +4,14 @@
 
 One block holds the four unknowns of a cable segment: its tension and the position of its far node. Block Gauss
 elimination runs from the drum to the tow point, with partial pivoting inside a block; between blocks none is needed,
-because what is eliminated first is the piece of cable between the drum and a held node, a well-posed problem by
-itself. The first column of every L_j is zero (a node knows its neighbour's position, not the tension beyond it).
+because the part eliminated first is the piece of cable between the drum and a held node, which is a well-posed
+problem. The first column of every L_j is zero (a node depends on its neighbour's position, not on the tension beyond
+it).
 
-The elimination ends at the tow point, so W_1 = D_1⁻¹ L_1 tells how the first block answers to a displacement of
-the tow point, all cable behind it included: the coupling to a vehicle gets that derivative for nothing.
+The elimination ends at the tow point, so W_1 = D_1⁻¹ L_1 is the response of the first block to a displacement of the
+tow point, with all the cable between it and the drum: the coupling to a vehicle gets that derivative at no cost.
 
-Bending makes it pentadiagonal (`factor_wide`): a balance then knows the places of five nodes.
+Bending makes the system pentadiagonal (`factor_wide`): a balance then depends on the places of five nodes.
 
     K_j z_{j−2} + L_j z_{j−1} + D_j z_j + U_j z_{j+1} + V_j z_{j+2} = r_j,   j = 1 … N
 
@@ -18,8 +19,7 @@ Elimination from the drum to the tow point leaves z_j = b_j − W_j z_{j−1} �
 
     U' = U_j − V_j W_{j+2},   D' = D_j − V_j X_{j+2} − U' W_{j+1},   W_j = D'⁻¹ (L_j − U' X_{j+1}),   X_j = D'⁻¹ K_j
 
-W replaces L and X replaces K, so W_1 still tells how the first block answers to the tow
-point.
+W replaces L and X replaces K, so W_1 is again the response of the first block to a displacement of the tow point.
 """
 
 from __future__ import annotations
@@ -33,24 +33,25 @@ SIZE = 4
 
 @inlined
 def factor_block(D: np.ndarray, pivots: np.ndarray) -> bool:
-    """Factor a 4×4 block in place by rows exchanged for size; return False when it is singular.
+    """Factor a 4×4 block in place, with partial pivoting by rows; return False when it is singular.
 
-    Multipliers stay in the row they were made in, so `solve_block` exchanges and eliminates in the same order;
-    the diagonal keeps the inverses of the pivots.
+    Multipliers are not moved by later row exchanges, so `solve_block` exchanges and eliminates in the same order;
+    the diagonal holds the inverses of the pivots.
     """
     for k in range(SIZE):
         best = k
+        # The largest entry of a column is its pivot: this keeps rounding errors small.
         for i in range(k + 1, SIZE):
             if abs(D[i, k]) > abs(D[best, k]):
                 best = i
         pivots[k] = best
         if not abs(D[best, k]) > 0.0:
             return False
-        if best != k:
+        if best != k:  # columns before k hold multipliers, which are not exchanged
             for c in range(k, SIZE):
                 D[k, c], D[best, c] = D[best, c], D[k, c]
         inverse = 1.0 / D[k, k]
-        D[k, k] = inverse  # what solves with it, many times, multiplies
+        D[k, k] = inverse  # the factors are used many times, and a multiplication is cheaper than a division
         for i in range(k + 1, SIZE):
             D[i, k] *= inverse
             for c in range(k + 1, SIZE):
@@ -63,11 +64,11 @@ def solve_block(D: np.ndarray, pivots: np.ndarray, b: np.ndarray) -> None:
     """Overwrite the right-hand side b (4,) with the solution of the factored block."""
     for k in range(SIZE):
         p = pivots[k]
-        if p != k:
+        if p != k:  # the exchanges of `factor_block`, in its order
             b[k], b[p] = b[p], b[k]
         for i in range(k + 1, SIZE):
             b[i] -= D[i, k] * b[k]
-    for k in range(SIZE - 1, -1, -1):
+    for k in range(SIZE - 1, -1, -1):  # back substitution; the diagonal holds inverses
         for c in range(k + 1, SIZE):
             b[k] -= D[k, c] * b[c]
         b[k] *= D[k, k]
@@ -75,8 +76,8 @@ def solve_block(D: np.ndarray, pivots: np.ndarray, b: np.ndarray) -> None:
 
 @inlined
 def solve_columns(D: np.ndarray, pivots: np.ndarray, B: np.ndarray) -> None:
-    """Do that with all four columns of B (4, 4), row by row."""
-    for k in range(SIZE):
+    """Overwrite the four columns of B (4, 4) with D⁻¹B, given the factored block, row by row."""
+    for k in range(SIZE):  # the innermost loops run along rows, which are contiguous in memory
         p = pivots[k]
         if p != k:
             for m in range(SIZE):
@@ -93,41 +94,43 @@ def solve_columns(D: np.ndarray, pivots: np.ndarray, B: np.ndarray) -> None:
 
 
 Row = tuple[float, float, float, float, float, float, float, float]
-"""A row of D_j, and behind it that of r_j, and of L_j without the column that is zero. Scalars stay in registers, which
-elements of an array do not: so it takes half as long."""
+"""A row of D_j, followed by that of r_j, and of L_j without the column that is zero. Scalars are kept in registers,
+unlike elements of an array, which halves the time."""
 Four = tuple[float, float, float, float]
 Block = tuple[Four, Four, Four, Four]
-"""The rows of z_j and, behind it, of W_j without the column that is zero."""
+"""The rows of z_j, each followed by that of W_j without the column that is zero."""
 
 
 @compiled
 def solve(L: np.ndarray, D: np.ndarray, U: np.ndarray, last: int, r: np.ndarray) -> int:
     """Overwrite r (blocks, 4) with the solution of blocks 1 … last, and L_j with W_j = D_j⁻¹ L_j.
 
-    The right-hand side goes through the elimination as the column of L_j that is zero, and stays there.
+    The right-hand side takes the place of the zero column of L_j during the elimination, and is kept there.
 
     Returns:
         0 when done, else the index of the singular block.
     """
     nothing = (0.0, 0.0, 0.0, 0.0)
     W = (nothing, nothing, nothing, nothing)
+    # From the drum to the tow point: this order needs no pivoting between blocks.
     for j in range(last, 0, -1):
         a, b = _row(D[j], L[j], r[j], 0), _row(D[j], L[j], r[j], 1)
         c, d = _row(D[j], L[j], r[j], 2), _row(D[j], L[j], r[j], 3)
         if j < last:  # a length knows the ends of its own segment only: row 0 of U is zero
             b, c, d = _less_next(b, U[j, 1], W), _less_next(c, U[j, 2], W), _less_next(d, U[j, 3], W)
         a, b, c, d = _eliminated(a, b, c, d)
+        # Written so that NaN fails, too.
         if not (abs(a[0]) > 0.0 and abs(b[1]) > 0.0 and abs(c[2]) > 0.0 and abs(d[3]) > 0.0):
             return j
         W = _substituted(a, b, c, d)
         _keep(W, L[j], r[j])
-    spread(L, last, r)
+    spread(L, last, r)  # back substitution; until here z_j lacks the part −W_j z_{j−1}
     return 0
 
 
 @inlined
 def _row(D: np.ndarray, L: np.ndarray, r: np.ndarray, i: int) -> Row:
-    """Return row i of a block."""
+    """Return row i of a block: D_j, then r_j, then L_j without its first column."""
     return D[i, 0], D[i, 1], D[i, 2], D[i, 3], r[i], L[i, 1], L[i, 2], L[i, 3]
 
 
@@ -149,7 +152,7 @@ def _less_next(a: Row, u: np.ndarray, W: Block) -> Row:
 
 @inlined
 def _eliminated(a: Row, b: Row, c: Row, d: Row) -> tuple[Row, Row, Row, Row]:
-    """Return four rows, exchanged for size, after the elimination: what is left below the diagonal means nothing."""
+    """Return four rows after the elimination, exchanged for size; entries below the diagonal are not meaningful."""
     if abs(b[0]) > abs(a[0]):
         a, b = b, a
     if abs(c[0]) > abs(a[0]):
@@ -185,7 +188,7 @@ def _less_four(a: Four, f: float, b: Four) -> Four:
 
 @inlined
 def _behind(a: Row) -> Four:
-    """Return what stands in a row behind D_j."""
+    """Return the part of a row after D_j: r_j, then L_j without its first column."""
     return a[4], a[5], a[6], a[7]
 
 
@@ -215,7 +218,7 @@ def _keep(W: Block, L: np.ndarray, r: np.ndarray) -> None:
 
 @inlined
 def spread(L: np.ndarray, last: int, r: np.ndarray) -> None:
-    """Take what each block does to the next off r (blocks, 4), from the tow point to the drum: z_j −= W_j z_{j−1}."""
+    """Subtract W_j z_{j−1} from r_j for all blocks (blocks, 4), from the tow point to the drum."""
     for j in range(2, last + 1):
         for column in range(1, SIZE):
             for row in range(SIZE):
@@ -227,7 +230,7 @@ def factor_wide(blocks: np.ndarray, pivots: np.ndarray, last: int) -> int:
     """Factor blocks 1 … last of L, D, U, K, V (5, blocks, 4, 4) in place; return 0, or the index of a singular one."""
     L, D, U, K, V = blocks[0], blocks[1], blocks[2], blocks[3], blocks[4]
     for j in range(last, 0, -1):
-        if j + 2 <= last:
+        if j + 2 <= last:  # V_j first: it changes U_j to U', which the products below need
             _take_off(V[j], L[j + 2], U[j])
             _take_off(V[j], K[j + 2], D[j])
         if j + 1 <= last:
@@ -235,8 +238,8 @@ def factor_wide(blocks: np.ndarray, pivots: np.ndarray, last: int) -> int:
             _take_off(U[j], K[j + 1], L[j])
         if not factor_block(D[j], pivots[j]):
             return j
-        solve_columns(D[j], pivots[j], L[j])
-        solve_columns(D[j], pivots[j], K[j])
+        solve_columns(D[j], pivots[j], L[j])  # W_j takes the place of L_j
+        solve_columns(D[j], pivots[j], K[j])  # X_j takes the place of K_j
     return 0
 
 
@@ -253,7 +256,7 @@ def _take_off(A: np.ndarray, B: np.ndarray, out: np.ndarray) -> None:
 
 @inner
 def solve_wide(blocks: np.ndarray, pivots: np.ndarray, last: int, r: np.ndarray) -> None:
-    """Overwrite r (blocks, 4) with the solution, given what `factor_wide` left."""
+    """Overwrite r (blocks, 4) with the solution, given the factors from `factor_wide`."""
     L, D, U, K, V = blocks[0], blocks[1], blocks[2], blocks[3], blocks[4]
     for j in range(last, 0, -1):
         for row in range(SIZE):

@@ -1,4 +1,4 @@
-"""What straight segments miss of the arc they stand for, put right to second order in the segment's length.
+"""Corrections of straight segments for the arc that they represent, to second order in the segment's length.
 
 On an arc of curvature κ that turns by θ = κℓ within a segment, with V_t' = κV_n (inextensible), a polygon with the
 right velocities at its nodes makes these errors, all of order θ²:
@@ -10,7 +10,7 @@ With drag quadratic in speed the tangential part wants V̄_t² (1 + θ²/2). It 
 speed: ΔV, the change of velocity over the segment, is V_t θ for a cable that slides along its own curve, and does not
 make one slip that merely turns.
 
-Across, the middle of a segment has V̄ = V + ⅛ℓ²V'', and ½(Q_j + Q_{j+1}) wants q − ℓ²q''/12 in the place of q. How far
+Across, the middle of a segment has V̄ = V + ⅛ℓ²V'', and ½(Q_j + Q_{j+1}) wants q − ℓ²q''/12 instead of q. How far
 the cable slides along its own curve, λ with ΔV = λU_tθ, says both: U_n' = −κ(1 − λ)U_t, and V''·n = λκ²U_n. So the part
 of the normal drag that lies in the plane of the curve wants a `normal_gain` of
 
@@ -52,11 +52,13 @@ def correct_for_arc(line: Line, led: bool, work: Load) -> None:
     """Fill line.slip and line.normal_gain from the prediction on level NEW and the velocities of level NOW; `led` by a
     winch, a cable need not slide.
     """
+    # Three tangents in rotation: a segment needs those of its two neighbours only.
     N, tangents = line.ends.count, scratch(3, 3)
     _tangent(line, 1, tangents[1])
     _tangent(line, 1, tangents[0])
     for j in range(1, N + 1):
         before, t, after = tangents[(j - 1) % 3], tangents[j % 3], tangents[(j + 1) % 3]
+        # The last segment has no next one: its own tangent takes that place.
         _tangent(line, min(j + 1, N), after)
         square = _turning_angle(line, j, before, after, work.across)
         theta, U = work.across, work.velocity
@@ -70,6 +72,7 @@ def correct_for_arc(line: Line, led: bool, work: Load) -> None:
             speed += U[i] * U[i]
         line.slip[j] = 0.25 * slide
         in_plane = min(side * side / max(square * (speed - along * along), STILL), 1.0)
+        # Without curvature or speed along the cable λ would be 0/0; a cable that is not led by a winch has λ = 1.
         reported = led and square * abs(along) > STILL
         sliding = min(max(slide / (square * along), 0.0), 1.0) if reported else 1.0
         oblique = along * along * square / max(side * side, STILL * STILL)
@@ -78,7 +81,7 @@ def correct_for_arc(line: Line, led: bool, work: Load) -> None:
 
 @inlined
 def _missing_gain(sliding: float, oblique: float) -> float:
-    """Return what the normal gain has beyond 1, over θ², for λ and U_t²/U_n²; at most 1 either way."""
+    """Return the normal gain minus 1, over θ², for λ and U_t²/U_n²; at most 1 either way."""
     held = 1.0 - sliding
     return min(max((1.0 + 2.0 * held - 2.0 * held * held * oblique) / 12.0 - 0.25 * sliding, -1.0), 1.0)
 
@@ -98,6 +101,7 @@ def _turning_angle(line: Line, j: int, before: np.ndarray, after: np.ndarray, th
     for i in range(3):
         theta[i] = share * (after[i] - before[i])
         square += theta[i] * theta[i]
+    # The vector is shortened together with its square, so that both corrections are limited.
     if square > MOST_BENT * MOST_BENT:
         for i in range(3):
             theta[i] *= MOST_BENT / sqrt(square)

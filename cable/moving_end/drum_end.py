@@ -1,4 +1,4 @@
-"""The drum's equation (11), the last row of a step, and the cable that lies loose before a drum that runs ahead.
+"""The drum's equation (11), the last row of a step, and the loose cable in front of a drum that overruns.
 
 The drum gives cable at the rate U_d, the water takes it at U = dℓ_N/dt, and L = ∫(U_d − U) dt lies loose:
 
@@ -9,7 +9,7 @@ The drum gives cable at the rate U_d, the water takes it at U = dℓ_N/dt, and L
 Where L = 0 for some steps, rates are differenced as all others, and U_d = U. Else to first order, with U_d from the
 lengths of two levels: the step in which L runs out takes U_d part of the way from the drum's speed to that of the
 cable, the next one the rest, and the impulse is (I_d/R_d²) ΔU_d. Differences of second order overshoot at that corner.
-A cable of one segment leaves no room for that: its drum gives what the chord asks for (`assembly`).
+This is not possible with a cable of one segment: its drum gives the length that the chord requires (`assembly`).
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ def drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load, slopes: bool
     N, t, r = line.ends.count, work.tangent, line.rows[RESIDUAL, line.ends.count]
     Qt = line.load[N, 0] * t[0] + line.load[N, 1] * t[1] + line.load[N, 2] * t[2]
     line.ends.drum_pull = line.tension[NEW, N] + 0.5 * Qt
+    # T t + ½Q: the last node carries half of the load of the last segment.
     for i in range(3):
         line.ends.drum_force[i] = line.tension[NEW, N] * t[i] + 0.5 * line.load[N, i]
     turn_drum(line, w, drum)
@@ -56,9 +57,9 @@ def drum_row(line: Line, w: Weights, drum: DrumNumbers, work: Load, slopes: bool
 
 @inner
 def drum_history(line: Line, w: Weights) -> tuple[float, float, float]:
-    """Return the weights of the drum's new speed in its acceleration and of the new length in its speed [1/s], and what
-    the speeds before add to the acceleration [m/s²]. Of first order while cable is loose, and until the jerk that ends
-    that is two steps behind.
+    """Return the weights of the drum's new speed in its acceleration and of the new length in its speed [1/s], and
+    the part of the acceleration that the speeds before give [m/s²]. They are of first order while cable is loose, and
+    until two steps after the jerk that ends that.
     """
     U, ahead = line.ends.payout, line.ends.ahead
     if line.ends.since_loose < KNOWN_STEPS:
@@ -114,7 +115,7 @@ def _differentiate_drum(line: Line, by_length: float, pulled: bool, Qt: float, w
 
 @compiled
 def _length_wanted(line: Line, drum: DrumNumbers) -> float:
-    """Return how long the last segment has to be: as long as it is, or what a winch asks for. [m]."""
+    """Return how long the last segment has to be: as long as it is, or as a winch requires. [m]."""
     if drum.control != LENGTH:
         return line.ends.last_length[NOW]
     return drum.setpoint - line.ends.settled

@@ -27,7 +27,8 @@ from cable.properties import CableNumbers
 from subzero.jit import compiled, inlined, inner
 
 LOSS, STORED, GRAVITY_WORK, AT_DRUM, ADDED_MASS, STRAINED, CARRIED, TOWED = range(8)
-"""What `energy_flow` fills: L, E [J], G, D_S, M, −∫T t·∂J/∂s ds, ∫m U·dJ/dt ds (mean over a step), −F·U(0). [W]"""
+"""Entries that `energy_flow` fills: L, E [J], G, D_S, M, −∫T t·∂J/∂s ds, ∫m U·dJ/dt ds (mean over a step), −F·U(0).
+[W]"""
 FLOWS = 8
 
 
@@ -44,6 +45,7 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
         evaluate_load(T, line.slip[j], line.normal_gain[j], 0.0, c, work)
         square, turn = 0.0, 0.0
         for i in range(3):
+            # Energies are those relative to the water: a cable that drifts with a uniform current has none.
             speed = V[i] - J[i]
             square += speed * speed
             loss += length * work.drag[i] * speed
@@ -66,6 +68,7 @@ def _carried(line: Line, j: int) -> float:
     if line.ends.previous_step <= 0.0:
         return 0.0
     power, V, J = 0.0, line.velocity, line.water
+    # Means over the step, as the change of the water is known between its two levels only.
     for i in range(3):
         change = J[NOW, j - 1, i] + J[NOW, j, i] - J[BEFORE, j - 1, i] - J[BEFORE, j, i]
         now = V[NOW, j - 1, i] + V[NOW, j, i] - J[NOW, j - 1, i] - J[NOW, j, i]
@@ -86,10 +89,12 @@ def _flow_at_ends(line: Line, c: CableNumbers, out: np.ndarray) -> None:
         size += d * d
         square += U * U
         out[TOWED] -= line.ends.tow.force[i] * (line.velocity[NOW, 0, i] - line.water[NOW, 0, i])
+    # At a free tail the pull of the drogue, times its speed through the water, is lost.
     if line.ends.layout.free_end:
         out[AT_DRUM] = T * np.sqrt(square)
         return
     along /= np.sqrt(max(size, 1e-30))
+    # Cable enters with kinetic and strain energy relative to the water.
     entering = 0.5 * (c.mass * square + c.added_mass * (square - along * along) + c.compliance * T * T)
     out[AT_DRUM] = -line.ends.payout[NOW] * entering
     for i in range(3):
@@ -98,7 +103,7 @@ def _flow_at_ends(line: Line, c: CableNumbers, out: np.ndarray) -> None:
 
 @inner
 def book_step(line: Line, step: float, c: CableNumbers, work: Load, ledger: np.ndarray) -> None:
-    """Add an accepted step to a ledger (3, FLOWS): flows before, flows now, and what came in, went out and is missing.
+    """Add an accepted step to a ledger (3, FLOWS): flows before, flows now, and the sums of work, terms and residual.
 
     The third row holds the work of the tow point, the sum of the sizes of all terms, and the residual of the balance
     at TOWED, LOSS and STORED. [J]
@@ -106,6 +111,7 @@ def book_step(line: Line, step: float, c: CableNumbers, work: Load, ledger: np.n
     for i in range(FLOWS):
         ledger[0, i] = ledger[1, i]
     energy_flow(line, c, work, ledger[1])
+    # The trapezoidal rule for powers, of second order like the steps.
     old, new, total, half = ledger[0], ledger[1], ledger[2], 0.5 * step
     stored = new[STORED] - old[STORED]
     spent = half * (old[LOSS] + new[LOSS]) + half * (old[AT_DRUM] + new[AT_DRUM])

@@ -51,7 +51,8 @@ ROUNDINGS = 5
 STILL = 1e-11
 """A cable at rest has moved by no more than this share of its length since water and arcs were last looked at."""
 WAVERS = 0.9
-"""A step that moves the cable by more than this share of what the one before did goes to and fro: try a shorter one."""
+"""A step that moves the cable by more than this share of the motion of the step before oscillates: try a shorter
+one."""
 LOOSER = 1e-7
 """Where a cable is so taut that rounding does not let it be solved to `schemes.TOLERANCE`, this will do."""
 LOOKS = 400
@@ -68,7 +69,7 @@ def _length(line: Line, j: int) -> float:
 
 @allocating
 def hang(line: Line, water: Water, c: CableNumbers, work: Load) -> float:
-    """Lay the line as a chain under loads that do not turn with it, and take the drag anew a few times.
+    """Lay the line as a chain under loads that do not turn with it, and compute the drag again a few times.
 
     Args:
         line: with the places of its first and last node, and the lengths of its segments.
@@ -80,6 +81,7 @@ def hang(line: Line, water: Water, c: CableNumbers, work: Load) -> float:
         the largest tension. [N]
     """
     N, F, whole, largest = line.ends.count, np.zeros(3), 0.0, 0.0
+    # A straight line between the ends is the first shape; its water gives the first drag.
     for j in range(N + 1):
         share = j / N
         for i in range(3):
@@ -87,6 +89,7 @@ def hang(line: Line, water: Water, c: CableNumbers, work: Load) -> float:
             line.position[NEW, j, i] = x[0, i] + share * (x[N, i] - x[0, i])
             line.velocity[NEW, j, i] = 0.0
     sample_water(line, water, line.ends.time)
+    # The direction of the cable is not known yet: the largest drag, square to the water, is the first load.
     for j in range(1, N + 1):
         _load_across(line, j, c, work)
         whole += _length(line, j)
@@ -101,6 +104,7 @@ def hang(line: Line, water: Water, c: CableNumbers, work: Load) -> float:
             )
             evaluate_load(line.tension[NEW, j], 0.0, 1.0, 0.0, c, work)
             for i in range(3):
+                # Half of the change, so that shape and drag settle instead of alternating.
                 line.load[j, i] += 0.5 * (_length(line, j) * work.q[i] - line.load[j, i])
     _keep(line, c, work)
     for j in range(1, N + 1):
@@ -130,11 +134,14 @@ def _close(line: Line, F: np.ndarray, e: float, whole: float) -> None:
         for i in range(3):
             square += line.load[j, i] ** 2
         size += sqrt(square)
+    # A cable without any load would have no scale for ε.
     size = max(size, 1e-9)
+    # ε → 0 is approached in stages: Newton's method converges from the minimum of the stage before.
     for level in range(ROUNDINGS):
         soft = size * 0.1 ** (1 + level)
         for _ in range(NEWTON_ROUNDS):
             value = _complementary(line, F, e, soft, load, gradient, hessian)
+            # The gradient of Φ is the gap by which the chain does not close. [m]
             if _norm(gradient) < 1e-9 * whole or not _solve_three(hessian, gradient, step):
                 break
             slope = step[0] * gradient[0] + step[1] * gradient[1] + step[2] * gradient[2]
@@ -142,6 +149,7 @@ def _close(line: Line, F: np.ndarray, e: float, whole: float) -> None:
             for _ in range(40):
                 for i in range(3):
                     trial[i] = F[i] - fraction * step[i]
+                # Φ is convex, so a step along Newton's direction always lowers it if it is short enough.
                 if _complementary(line, trial, e, soft, load, gradient, hessian) <= (
                     value - 1e-4 * fraction * slope
                 ):
@@ -209,9 +217,14 @@ def _solve_three(A: np.ndarray, b: np.ndarray, out: np.ndarray) -> bool:
     return True
 
 
+# A residual gap of the last iteration is spread evenly over the nodes.
+
+
 @inner
 def _lay(line: Line, F: np.ndarray, e: float) -> None:
-    """Fill places and tensions of level NEW from the force at the first end; what does not close is shared out."""
+    """Fill places and tensions of level NEW from the force at the first end; the closing error is spread over the
+    nodes.
+    """
     N, x = line.ends.count, line.position
     for i in range(3):
         x[NEW, 0, i] = x[NOW, 0, i]
@@ -236,6 +249,7 @@ def _keep(line: Line, c: CableNumbers, work: Load) -> None:
     """Make level NEW the present one, and the one before, at rest."""
     N = line.ends.count
     for j in range(N + 1):
+        # All levels are the same at rest, so that the next step sees no velocity and no acceleration.
         for i in range(3):
             for level in range(3):
                 line.position[level, j, i] = line.position[NEW, j, i]
@@ -255,8 +269,8 @@ def _keep(line: Line, c: CableNumbers, work: Load) -> None:
 def relax(line: Line, water: Water, c: CableNumbers, drum: DrumNumbers, work: Load) -> int:
     """Take steps from rest, the first one without inertia, until nothing moves; return how many, or −1.
 
-    Tensions should be of about 1 N, as those that `time_step` was made for: rest does not know the size of forces, so
-    weight, drag and stiffness can be divided by any number, and the compliance multiplied by it.
+    Tensions should be of about 1 N, as those that `time_step` was made for: rest does not depend on the size of
+    forces, so weight, drag and stiffness can be divided by any number, and the compliance multiplied by it.
 
     Args:
         line: with places and tensions at level NOW.
@@ -265,11 +279,13 @@ def relax(line: Line, water: Water, c: CableNumbers, drum: DrumNumbers, work: Lo
         drum: a winch that holds the length.
         work: work space.
     """
+    # The first step, beyond `LONGEST`, leaves inertia out.
     step, last = 10.0 * LONGEST, np.inf
     whole = line.ends.settled + line.ends.last_length[NOW]
     for k in range(LOOKS):
         solved = _step_from_rest(line, step, water, c, drum, work)
         if not solved:
+            # With inertia and a shorter step, the solution is closer to the present shape.
             step = FIRST if step > LONGEST else 0.2 * step
             last = np.inf
             if step < SHORTEST:
@@ -277,9 +293,11 @@ def relax(line: Line, water: Water, c: CableNumbers, drum: DrumNumbers, work: Lo
             continue
         moved = _moved(line)
         _keep(line, c, work)
+        # Only a step without inertia proves rest: with it, a slow motion looks the same.
         if step > LONGEST and moved <= STILL * whole:
             fill_node_tensions(line)
             return k + 1
+        # The cable oscillates: a shorter step follows its motion.
         if moved > WAVERS * last and moved > 1e-6 * whole:
             step = 0.3 * min(step, LONGEST)
         elif moved < 0.5 * last or step > LONGEST:
@@ -295,6 +313,7 @@ def _step_from_rest(
     """Solve for level NEW a step from rest at level NOW; less exactly where rounding asks for it, and with a softened
     slack law where the sharp one fails.
     """
+    # Weights of first order without a past: nothing moved before, and a steady state needs no accuracy in time.
     a = 1.0 / step if step <= LONGEST else 0.0
     w = Weights(a, -a, 0.0, a, -a, 0.0, 0.0, a)
     for tolerance in (TOLERANCE, LOOSER):
@@ -315,7 +334,7 @@ def _step_from_rest(
 
 @inner
 def _guess(line: Line, water: Water, work: Load) -> None:
-    """Fill level NEW with the present one, and what is held while a step is solved."""
+    """Fill level NEW with the present level, and the water and the arc corrections that a step keeps fixed."""
     for j in range(line.ends.count + 1):
         line.tension[NEW, j] = line.tension[NOW, j]
         for i in range(3):

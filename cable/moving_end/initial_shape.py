@@ -25,11 +25,12 @@ def lay_straight(
     The cable is as long as `wet_length` says, in segments of `spacing`, those far from both ends as long as
     `remeshing.join_far` would make them; it comes off the drum as fast as the tow point
     moves away, and its tension is that of a steady straight pull with none at the drum, so a run can start at speed
-    without a jolt. Needs 0 < wet_length and room.
+    without a jolt. Requires 0 < wet_length and a line with enough capacity.
     """
     ends, away = line.ends, 0.0
     ends.count, ends.settled, ends.time, ends.previous_step = 1, 0.0, 0.0, 0.0
     ends.drum_mode, ends.drum_pull = TURNING, 0.0
+    # The last segment, which grows at the drum, takes the remainder.
     while wet_length - ends.settled > SPLIT_AT * spacing(line):
         line.length[ends.count] = spacing(line) + _more_in_the_middle(line, wet_length)
         ends.settled += line.length[ends.count]
@@ -64,12 +65,14 @@ def _pull_straight(
     line: Line, wet_length: float, direction: np.ndarray, tow: np.ndarray, drum: DrumNumbers, c: CableNumbers
 ) -> None:
     """Fill places, velocities (even between both ends) and tensions of a straight cable that moves along itself."""
+    # A straight cable that moves along itself has the drag of its speed along itself only.
     speed = tow[0] * direction[0] + tow[1] * direction[1] + tow[2] * direction[2]
     per_metre, along = c.tangential_drag * speed * abs(speed), wet_length
     for j in range(line.ends.count + 1):
         if j > 0:
             for level in range(2):
                 line.tension[level, j] = per_metre * (along - 0.5 * line.length[j])
+            # `along` is the distance from the drum: it falls from the wet length to zero at the last node.
             along = along - line.length[j] if j < line.ends.count else 0.0
         line.node_tension[j] = max(per_metre, 0.0) * along
         for i in range(3):
@@ -83,10 +86,11 @@ def _pull_straight(
 
 
 def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, payout: float) -> None:
-    """Lay a line as it hangs, at all levels of time: at rest, or carried along by ends that move at `tow` and `drum`.
+    """Lay a line in an equilibrium shape, at all levels of time: at rest, or moving with ends at velocity `tow` and
+    `drum`.
 
     Args:
-        line: with room for its segments; filled, relative to the second end.
+        line: with space for its segments; filled, relative to the second end.
         held: the equilibrium.
         tow: velocity of its first end (3,); even along the cable to the other. [m/s]
         drum: velocity of its second end (3,). [m/s]
@@ -106,7 +110,9 @@ def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, p
 
 @compiled
 def start_in_water(line: Line, water: Water, c: CableNumbers, work: Load) -> None:
-    """Fill the water's velocity at the nodes and the segments' momenta, at all levels, from what moves at the start."""
+    """Fill the water's velocity at the nodes and the segments' momenta, at all levels, from the motion at the
+    start.
+    """
     sample_water(line, water, line.ends.time)
     for level in (NOW, BEFORE):
         for j in range(line.ends.count + 1):
@@ -122,6 +128,7 @@ def steady_direction(
 ) -> np.ndarray:
     """Return the direction from the tail to the tow point in a steady tow, a unit vector (3,)."""
     speed, weight = float(np.linalg.norm(velocity[0] - J)), cable.weight_in_water
+    # A cable at rest in the water hangs straight down, or up if it is buoyant.
     if speed == 0.0 and weight != 0.0:
         return np.array([0.0, 0.0, -np.sign(weight)])
     ahead = first_direction(velocity - J)
@@ -142,6 +149,7 @@ def set_steady_tow(
     line.ends.payout[:] = 0.0
     pulls, middles = [tail_drag * float(U @ U)], []
     lengths = [*line.length[1:N].tolist(), line.ends.last_length[NOW]]
+    # From the tail to the tow point, as the tension of each segment depends on the one before.
     for length in reversed(lengths):
         middles.append(_grown(pulls[-1], 0.5 * length, drag, weight, cable.compliance))
         pulls.append(_grown(middles[-1], 0.5 * length, drag, weight, cable.compliance))

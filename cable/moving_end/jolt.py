@@ -1,12 +1,12 @@
-"""A tow point that changes its velocity at once: an impulse along the whole cable, taken apart from the steps of time.
+"""A tow point that changes its velocity at once: an impulse along the whole cable, separate from the time steps.
 
 A cable that does not stretch has to follow at once. With ΔV the jump of the velocity of a node, τ the impulse of the
 tension in a segment and ΔP = ℓ (m ΔV + ρA ΔV_⊥) that of its momentum,
 
     τ_j t_j − τ_{j+1} t_{j+1} + ½(ΔP_j + ΔP_{j+1}) = 0,     (ΔV_j − ΔV_{j−1})·t_j = 0
 
-the equations of `assembly` in an infinitely short step: drag and weight have no part in it, places stay as they
-are. A step of time that spreads this impulse over its length shows a peak, or a dip, of the tension that grows
+the equations of `assembly` in an infinitely short step: drag and weight have no part in it, positions do not
+change. A time step that spreads this impulse over its length shows a peak, or a dip, of the tension that grows
 without bound as the step gets shorter, and rings after it.
 
 An impulse that pushes is a cable that gets slack for the time in which drag slows it down, −τ/T: 2 ms where the
@@ -27,7 +27,7 @@ from cable.properties import CableNumbers
 from subzero.jit import allocating, inlined, inner
 
 FELT = 1e-6
-"""A jump of the tow point's velocity smaller than this is none. [m/s]"""
+"""A jump of the tow point's velocity smaller than this counts as zero. [m/s]"""
 LOOSE = 1e-6
 """Loose cable shorter than this is rounding. [m]"""
 SLACK_FOR = 0.01
@@ -38,7 +38,7 @@ SLACK_FOR = 0.01
 def take_jolt(
     line: Line, change: np.ndarray, c: CableNumbers, drum: DrumNumbers, work: Load, out: np.ndarray
 ) -> bool:
-    """Give a line, at level NOW, the velocities that it has just after a jolt; say whether it was taken.
+    """Give a line, at level NOW, the velocities that it has just after a jolt; return whether it was taken.
 
     Args:
         line: the cable.
@@ -51,18 +51,22 @@ def take_jolt(
     for i in range(3):
         out[i] = 0.0
     size = max(abs(change[0]), abs(change[1]), abs(change[2]))
+    # A cable that stretches takes a jolt up in waves; a free tail or a single segment is left to the time steps.
     if size < FELT or c.compliance > 0.0 or line.ends.count < 2 or line.ends.layout.free_end:
         return False
     tangents, masses = np.zeros((line.ends.count + 1, 3)), np.zeros((3, 3))
     _fill_tangents(line, tangents)
     _assemble(line, tangents, change, c, drum, masses)
     blocks, jump = line.blocks, line.rows[RESIDUAL]
+    # The blocks of the time step are used as work space, so their factors are lost.
     line.ends.solver.factored = False
     if solve(blocks[LOWER], blocks[DIAGONAL], blocks[UPPER], line.ends.count, jump) > 0:
         return False
+    # An impulse that pushes would make the cable slack: for longer than `SLACK_FOR`, it is left to the time steps.
     for j in range(1, line.ends.count + 1):
         if jump[j, 0] < -max(line.tension[NOW, j], 0.0) * SLACK_FOR:
             return False
+    # Half of the mass of the first segment is at the tow point, and moves at the mean of two nodes: a quarter each.
     _mass(line, tangents, 1, c, masses)
     for i in range(3):
         out[i] = jump[1, 0] * tangents[1, i]
@@ -123,6 +127,7 @@ def _assemble(
         _mass(line, tangents, j, c, M)
         t = tangents[j]
         for i in range(3):
+            # Row 0 of a block: the segment does not stretch, (ΔV_j − ΔV_{j−1})·t_j = 0.
             L[j, 0, 1 + i] = -t[i]
             if j < N:
                 D[j, 0, 1 + i] = t[i]
@@ -130,6 +135,7 @@ def _assemble(
             if j > 1:
                 U[j - 1, 1 + i, 0] -= t[i]
             for k in range(3):
+                # Half of a segment's mass at each node, times half of the velocity of each node.
                 quarter = 0.25 * M[i, k]
                 if j < N:
                     D[j, 1 + i, 1 + k] += quarter
@@ -139,6 +145,7 @@ def _assemble(
                     if j < N:
                         U[j - 1, 1 + i, 1 + k] += quarter
     _assemble_drum(line, tangents, M, drum)
+    # ΔV_0 is known: its column moves to the right-hand side.
     for m in range(4):
         for k in range(3):
             r[1, m] -= L[1, m, 1 + k] * change[k]
@@ -156,6 +163,7 @@ def _assemble_drum(line: Line, tangents: np.ndarray, M: np.ndarray, drum: DrumNu
             Mt += M[i, k] * t[k]
         mass += t[i] * Mt
         U[N - 1, 1 + i, 1] -= 0.25 * Mt
+    # The last block has two unknowns, τ_N and ΔU; the other two rows are 0 = 0.
     D[0, 1], D[2, 2], D[3, 3] = -1.0, 1.0, 1.0
     if drum.control == LENGTH or line.ends.drum_mode == STANDING:
         D[1, 1] = 1.0
@@ -169,13 +177,13 @@ def _assemble_drum(line: Line, tangents: np.ndarray, M: np.ndarray, drum: DrumNu
 
 @inlined
 def _is_ahead(line: Line) -> bool:
-    """Say whether loose cable keeps a jolt from the drum."""
+    """Return whether loose cable keeps a jolt from the drum."""
     return line.ends.drum_mode == SPINNING and line.ends.loose[NOW] > LOOSE
 
 
 @inner
 def _apply(line: Line, tangents: np.ndarray, change: np.ndarray, c: CableNumbers, work: Load) -> None:
-    """Add the jumps to the velocities of level NOW, and forget what was before."""
+    """Add the jumps to the velocities of level NOW, and discard the levels before."""
     N, jump = line.ends.count, line.rows[RESIDUAL]
     for i in range(3):
         line.velocity[NOW, 0, i] += change[i]
@@ -187,6 +195,7 @@ def _apply(line: Line, tangents: np.ndarray, change: np.ndarray, c: CableNumbers
     if _is_ahead(line):
         line.ends.ahead[NOW] -= jump[N, 1]
     line.ends.ahead[BEFORE] = line.ends.ahead[NOW]
+    # Differences of second order across the jump would be wrong: the next step has no past.
     line.ends.previous_step = 0.0
     for j in range(1, N + 1):
         segment_momentum(line, NOW, j, _length(line, j), c, work)

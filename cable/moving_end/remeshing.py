@@ -45,6 +45,7 @@ def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
     line.ends.since_loose = 0 if line.ends.loose[NOW] > 0.0 else min(line.ends.since_loose + 1, KNOWN_STEPS)
     line.ends.previous_step = step
     line.ends.time += step
+    # A cable with a free tail neither grows nor shrinks.
     if line.ends.layout.free_end:
         return
     last = line.ends.last_length
@@ -61,12 +62,13 @@ def split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) -
     """Insert a node `segment_length` from the start of the last segment, on its chord, at levels NOW and BEFORE.
 
     The new node is a material point. At level BEFORE it may still have been on the drum: then it is put where the
-    straight continuation of the chord would have had it, so that its backward differences stay smooth. Where little or
-    nothing of the last segment was out of the drum then, the segment before it is continued: a step may pay out several
-    segments, or one exactly.
+    straight continuation of the chord would have had it, so that its backward differences remain smooth. Where little
+    or nothing of the last segment was out of the drum then, the segment before it is continued: a step may pay out
+    several segments, or one exactly.
     """
     N = line.ends.count
     for level in (NOW, BEFORE):
+        # Too little of the segment was out of the drum at this level to interpolate on its chord.
         beyond = N > 1 and line.ends.last_length[level] < 0.5 * segment_length
         fraction = segment_length / (line.length[N - 1] if beyond else line.ends.last_length[level])
         _insert_between(line.position[level], N, fraction, beyond)
@@ -123,6 +125,7 @@ def merge_last(line: Line, c: CableNumbers, work: Load) -> None:
         square += (line.position[NOW, N, i] - line.position[NOW, N - 2, i]) ** 2
     whole = line.length[N - 1] + last[NOW]
     pieces = _chord(line, N - 1) + _chord(line, N)
+    # Only a taut segment is as long as its chord; a slack one keeps its material.
     taut = min(line.tension[NOW, N - 1], line.tension[NOW, N]) > KNOWN
     cut_off = whole * (1.0 - np.sqrt(square) / max(pieces, 1e-12)) if taut else 0.0
     for level in (NOW, BEFORE):
@@ -134,6 +137,7 @@ def merge_last(line: Line, c: CableNumbers, work: Load) -> None:
     line.tension[NOW, N - 1] = 0.5 * (line.tension[NOW, N - 1] + line.tension[NOW, N])
     line.tension[BEFORE, N - 1] = 0.5 * (line.tension[BEFORE, N - 1] + line.tension[BEFORE, N])
     line.node_tension[N - 1] = line.node_tension[N]
+    # The number of blocks changes, so the factors of the last matrix are of no use.
     line.ends.count, line.ends.solver.factored = N - 1, False
     line.ends.settled -= line.length[N - 1]
     for level in (NOW, BEFORE):
@@ -145,8 +149,8 @@ def join_far(line: Line, c: CableNumbers, work: Load) -> None:
     """Join pairs of segments far from both ends to one, where the cable is taut and nearly straight.
 
     b metres beyond `far_length` from the nearer end, a segment may be Δs + g s + g₁ b long, up to `LONGEST` more. The
-    ends stay fine: there a cable bends, the vehicle by its turns, a current or the cable's weight beside the drum,
-    where it hardly pulls.
+    ends keep short segments: there a cable bends, near the vehicle in its turns, and near the drum, where it hardly
+    pulls, by a current or its own weight.
     """
     ends, layout, along, j = line.ends, line.ends.layout, 0.0, 1
     while j < ends.count - 1:
@@ -159,6 +163,7 @@ def join_far(line: Line, c: CableNumbers, work: Load) -> None:
                 _join(line, j, whole, cut_off)
                 for level in (NOW, BEFORE):
                     segment_momentum(line, level, j, line.length[j], c, work)
+        # In one pass a segment is joined once at most: the next pair begins after it.
         along += line.length[j]
         j += 1
 
@@ -176,6 +181,7 @@ def _cut_off(line: Line, j: int) -> float:
 def _join(line: Line, j: int, whole: float, cut_off: float) -> None:
     """Take node j out: segments j and j + 1 become one, as long as its chord; the rest goes back to the drum."""
     N, share = line.ends.count, line.length[j] / whole
+    # Quantities of the joined segment are means of its parts, weighted by their lengths.
     line.slip[j] += (1.0 - share) * (line.slip[j + 1] - line.slip[j])
     line.normal_gain[j] += (1.0 - share) * (line.normal_gain[j + 1] - line.normal_gain[j])
     for level in (NOW, BEFORE):

@@ -27,7 +27,7 @@ from subzero.jit import Record, inlined, inner, made_once
 
 
 class Load(Record):
-    """Work space for one segment: what is known of it, its load q, and derivatives.
+    """Work space for one segment: its geometry, its load q, and derivatives.
 
     Attributes:
         velocity, water, chord: V of the segment's middle, J there, and d (3,).
@@ -87,8 +87,8 @@ def evaluate_momentum(c: CableNumbers, work: Load) -> None:
 def measured_chord(x: np.ndarray, j: int, length: float) -> tuple[float, float, float]:
     """Return |d|²/ℓ² [-], r [m] and 1/r [1/m] of segment j, given the nodes at one level (nodes, 3), see `slack_law`.
 
-    Whoever goes along a cable measures the next chord before it works on this one: a processor does the root and the
-    quotients, which wait for one another, beside that.
+    A loop along the cable measures the next chord before it works on the present one: the processor then computes the
+    root and the quotients, which depend on one another, in parallel with that work.
     """
     a, b, d = x[j, 0] - x[j - 1, 0], x[j, 1] - x[j - 1, 1], x[j, 2] - x[j - 1, 2]
     square = (a * a + b * b + d * d) / (length * length)
@@ -110,22 +110,25 @@ def evaluate_load(T: float, slip: float, gain: float, a0: float, c: CableNumbers
     """
     t, across = work.tangent, work.across
     for i in range(3):
+        # 1/r is known: a multiplication instead of a division.
         t[i] = work.chord[i] * work.shorter
     evaluate_momentum(c, work)
     Ut = work.along
     normal = sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2])
+    # A stretched segment is longer and thinner: its surface is √(1+eT) times as large.
     stretch = sqrt(1.0 + c.compliance * T)
     kt, kn = stretch * c.tangential_drag, gain * stretch * c.normal_drag
     for i in range(3):
         work.drag[i] = kt * abs(Ut + slip) * (Ut + slip) * t[i] + kn * normal * across[i]
         work.q[i] = a0 * work.momentum[i] + work.drag[i]
+    # −w_c k: k points down, along the third axis.
     work.q[2] -= c.weight
     work.side, work.kt, work.kn = normal, kt, kn
 
 
 @inner
 def differentiate_load(slip: float, a0: float, c: CableNumbers, work: Load) -> None:
-    """Fill ∂q/∂V and ∂q/∂d of what `evaluate_load` has filled.
+    """Fill ∂q/∂V and ∂q/∂d of the load filled by `evaluate_load`.
 
     With W = U_t + slip, the drag across k_n (|U_⊥| I + U_⊥ U_⊥ᵀ/|U_⊥|) by U_⊥, ∂U_⊥/∂V = P = I − t tᵀ,
     ∂U_⊥/∂t = −(t Uᵀ + U_t I) and ∂t/∂d = (I − g t tᵀ)/r:
@@ -136,6 +139,7 @@ def differentiate_load(slip: float, a0: float, c: CableNumbers, work: Load) -> N
     """
     t, across, Ut, normal = work.tangent, work.across, work.along, work.side
     g, pulled = turning_rate(work.square), work.kt * abs(Ut + slip)
+    # U_⊥ U_⊥ᵀ/|U_⊥| tends to 0 with U_⊥.
     turned = work.kn / normal if normal > 1e-12 else 0.0
     inert, side = a0 * c.added_mass, work.kn * normal
     At = turned * (across[0] * t[0] + across[1] * t[1] + across[2] * t[2])
@@ -150,7 +154,7 @@ def differentiate_load(slip: float, a0: float, c: CableNumbers, work: Load) -> N
 
 @inlined
 def _differentiate_by_chord(i: int, alpha: float, bent: float, by_t: float, g: float, work: Load) -> None:
-    """Fill row i of ∂q/∂d and of (∂q/∂t) t, of α, U_t k_n U_⊥/|U_⊥| and what stands before I in ∂q/∂t."""
+    """Fill row i of ∂q/∂d and of (∂q/∂t) t, of α, U_t k_n U_⊥/|U_⊥| and the factor of I in ∂q/∂t."""
     V, J, t, across = work.velocity, work.water, work.tangent, work.across
     x, y, z = t[0], t[1], t[2]
     a = alpha * (V[0] - J[0]) - bent * across[0] + (by_t if i == 0 else 0.0)
@@ -168,6 +172,7 @@ def take_segment(x: np.ndarray, V: np.ndarray, J: np.ndarray, j: int, work: Load
     """Fill chord, velocity and water of segment j, given those of the nodes at one level (nodes, 3)."""
     for i in range(3):
         work.chord[i] = x[j, i] - x[j - 1, i]
+        # The middle of a segment moves at the mean velocity of its nodes.
         work.velocity[i] = 0.5 * (V[j - 1, i] + V[j, i])
         work.water[i] = 0.5 * (J[j - 1, i] + J[j, i])
 
@@ -175,6 +180,7 @@ def take_segment(x: np.ndarray, V: np.ndarray, J: np.ndarray, j: int, work: Load
 @inner
 def segment_momentum(line: Line, level: int, j: int, length: float, c: CableNumbers, work: Load) -> None:
     """Fill ∫p ds of segment j at a level; the tangent is the one of level NOW, where the segment has a length."""
+    # At an earlier level the growing segment may have had no length, and so no tangent.
     take_segment(line.position[NOW], line.velocity[level], line.water[level], j, work)
     whole = line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
     r = chord_length(squared_share(work.chord, whole), whole)

@@ -5,7 +5,7 @@ A thin cable cannot be compressed: it buckles, and its chord gets shorter. With 
 
     T ≥ 0,   σ ≥ 0,   T σ = 0
 
-which is smoothed to T σ = T₀ (`SMOOTHING`, 1e-13 N) and written as one equation that Newton's method likes,
+which is smoothed to T σ = T₀ (`SMOOTHING`, 1e-13 N) and written as one equation that suits Newton's method,
 the Fischer-Burmeister function φ(a, b) = a + b − √(a² + b² + 2μ) = 0 with a = T/T_r and b = σ/σ_r.
 
 Departs from source: the paper takes the cable as taut everywhere (its equations are singular at T = 0). The cost of
@@ -30,7 +30,7 @@ SMOOTHING = 1e-13
 SOFTEST = 1e-4
 """T₀ that a difficult step starts with, a tenth at a time down to `SMOOTHING`. [N]"""
 KNOWN = 1e-4
-"""A cable with more tension than this is taut, and its tension is foreseen from the steps before. [N]"""
+"""A cable with more tension than this is taut, and its tension is extrapolated from the steps before. [N]"""
 FOLDING = 0.3
 """How early a heaped segment loses its direction, see `chord_length`; without any effect on a taut one."""
 
@@ -38,8 +38,8 @@ FOLDING = 0.3
 @inlined
 def slack_law(T: float, shortening: float, smoothing: float) -> tuple[float, float, float]:
     """Return φ and its derivatives by the tension T [N] and the shortening σ [-], for T₀ = `smoothing` [N]."""
-    # φ = 0 says a b = μ with a, b ≥ 0. Newton's method likes its slopes: a taut segment has ∂φ/∂T ≈ 0 and a row that
-    # says σ = 0, a slack one ∂φ/∂σ ≈ 0 and a row that says T = 0, and nobody has to guess which of the two it is.
+    # φ = 0 says a b = μ with a, b ≥ 0. It suits Newton's method: a taut segment has ∂φ/∂T ≈ 0 and a row that says
+    # σ = 0, a slack one ∂φ/∂σ ≈ 0 and a row that says T = 0, so it is not necessary to guess which of the two it is.
     a, b = T / TENSION_SCALE, shortening / STRAIN_SCALE
     mu = smoothing / (TENSION_SCALE * STRAIN_SCALE)
     s = sqrt(a * a + b * b + 2.0 * mu)

@@ -19,6 +19,7 @@ from cable.moving_end.slack_law import SMOOTHING
 from cable.schemes import TOLERANCE
 from subzero.jit import Record, inlined, inner, made_once
 
+# Levels of time: indices of the first axis of the arrays of `Line`.
 NEW, NOW, BEFORE = 0, 1, 2
 
 KNOWN_STEPS = 3
@@ -33,13 +34,13 @@ propeller speeds, three steps), which goes slack for a moment, all are solved wi
 
 
 class Layout(Record):
-    """How a cable is divided, and what its far end is: chosen at the start.
+    """How a cable is divided into segments, and the kind of its far end; chosen at the start.
 
     Attributes:
         segment_length, grading: new segments are `segment_length` + `grading` s long, s from the tow point. [m], [-]
         far_length, far_grading: farther than this from both ends, segments are joined to longer ones, by so much per
             metre (`remeshing.join_far`); 0: none are. [m], [-]
-        run_in: length L₀ beside the tow point in which segments are shorter (`spacing`), 0 for none. [m]
+        run_in: length L₀ from the tow point in which segments are shorter (`spacing`), 0 for none. [m]
         free_end: whether the far end is a free tail instead of the drum.
         tail_drag: ½ρC_dA of a drogue there. [kg/m]
     """
@@ -86,7 +87,7 @@ class Solved(Record):
 
 
 class Tow(Record):
-    """The force on the vehicle, and how it answers to the place of the tow point.
+    """The force on the vehicle, and its derivatives by the place of the tow point.
 
     Attributes:
         force: at level NEW (3,). [N]
@@ -107,7 +108,7 @@ class Tow(Record):
 
 
 class Ends(Record):
-    """What a cable has once: its growing end at the drum, its tow point, and how it is divided and solved.
+    """The fields of a cable that exist once: its growing end at the drum, its tow point, its division and its solver.
 
     Attributes:
         count: number of segments.
@@ -117,13 +118,13 @@ class Ends(Record):
         loose: length of the cable that a drum has thrown out ahead of what the water takes (3 levels,). [m]
         ahead: how much faster the drum gives cable than the water takes it (3 levels,). [m/s]
         since_loose: steps since cable was last loose; no more are counted than `KNOWN_STEPS`.
-        drum_mode: what the drum does (`cable.drum`).
+        drum_mode: the state of the drum (`cable.drum`).
         drum_pull: tension at the drum at level NEW. [N]
-        drum_force: the cable's pull on it, with what acts across the last half segment (3,). [N]
+        drum_force: the cable's pull on it, with the load of the last half segment (3,). [N]
         drum_velocity: of the drum at level NEW (3,). [m/s]
         time: of level NOW. [s]
         previous_step: t_now − t_before, 0 after a start. [s]
-        layout: how the cable is divided, and what its far end is.
+        layout: how the cable is divided, and the kind of its far end.
         tow: the force on the vehicle.
         solver: how a step is solved.
         solved: how the last step that was tried was solved.
@@ -152,7 +153,7 @@ class Line(NamedTuple):
     """The state of a cable; segment j lies between nodes j−1 and j, so index 0 of segment arrays is unused.
 
     Attributes:
-        ends: what there is once.
+        ends: the fields that exist once.
         position: node positions (3 levels, nodes, 3). [m]
         velocity: velocities of the material at the nodes (3 levels, nodes, 3). [m/s]
         momentum: momentum ∫p ds of the segments (3 levels, nodes, 3). [kg m/s]
@@ -163,8 +164,8 @@ class Line(NamedTuple):
         forcing: a further force per length on segment j at level NEW (nodes, 3), for made-up solutions. [N/m]
         slip, normal_gain: corrections for the arc that a segment stands for (nodes,), see `chord_correction`. [m/s, 1]
         load: ∫(∂p/∂t + D − w_c k) ds of the segments at level NEW (nodes, 3). [N]
-        blocks: of the Newton matrix (5, nodes, 4, 4): `LOWER`, `DIAGONAL`, `UPPER`, see `block_solver`; beside them
-            `LOWER2` and `UPPER2` of a cable with bending stiffness, see `block_solver`.
+        blocks: of the Newton matrix (5, nodes, 4, 4): `LOWER`, `DIAGONAL`, `UPPER`, and for a cable with bending
+            stiffness `LOWER2` and `UPPER2`, see `block_solver`.
         pivots: of the factored blocks (nodes, 4).
         rows: residual, guess and Newton step of the unknowns (3, nodes, 4).
     """
@@ -193,13 +194,14 @@ LOWER, DIAGONAL, UPPER, LOWER2, UPPER2 = range(5)
 
 
 def new_line(capacity: int) -> Line:
-    """Return an empty line with room for `capacity` segments."""
+    """Return an empty line with space for `capacity` segments."""
+    # A line of n segments has n + 1 nodes.
     return Line(ends=_new_ends(), **_per_node(capacity + 1))
 
 
 @made_once
 def _new_ends() -> Ends:
-    """Return what an empty line has once."""
+    """Return the fields of an empty line that exist once."""
     tow = Tow(
         force=np.zeros(3),
         past=np.zeros((2, 3)),
@@ -215,12 +217,14 @@ def _new_ends() -> Ends:
         payout=np.zeros(3),
         loose=np.zeros(3),
         ahead=np.zeros(3),
+        # No cable was loose yet, so rates are of second order from the start.
         since_loose=KNOWN_STEPS,
         drum_mode=TURNING,
         drum_pull=0.0,
         drum_force=np.zeros(3),
         drum_velocity=np.zeros(3),
         time=0.0,
+        # 0: there is no earlier level.
         previous_step=0.0,
         layout=Layout(),
         tow=tow,
@@ -230,7 +234,7 @@ def _new_ends() -> Ends:
 
 
 def _per_node(n: int) -> dict[str, Any]:
-    """Return what an empty line has of each of n nodes, by name."""
+    """Return the arrays of an empty line over n nodes, by name."""
     vectors = {name: np.zeros((3, n, 3)) for name in ("position", "velocity", "momentum", "water")}
     return vectors | {
         "tension": np.zeros((3, n)),
@@ -238,8 +242,10 @@ def _per_node(n: int) -> dict[str, Any]:
         "node_tension": np.zeros(n),
         "forcing": np.zeros((n, 3)),
         "slip": np.zeros(n),
+        # A gain of 1 is no correction.
         "normal_gain": np.ones(n),
         "load": np.zeros((n, 3)),
+        # The outer two of the five diagonals are used by a cable with bending stiffness only.
         "blocks": np.zeros((5, n, 4, 4)),
         "pivots": np.zeros((n, 4), np.int64),
         "rows": np.zeros((3, n, 4)),
@@ -247,8 +253,9 @@ def _per_node(n: int) -> dict[str, Any]:
 
 
 def enlarged(line: Line, capacity: int) -> Line:
-    """Return the same line with room for `capacity` segments."""
+    """Return the same line with space for `capacity` segments."""
     larger = _per_node(capacity + 1)
+    # Nodes keep their numbers: old arrays fill the beginning of the new ones.
     for name, new in larger.items():
         old = getattr(line, name)
         new[tuple(slice(0, size) for size in old.shape)] = old
@@ -263,7 +270,7 @@ def in_water(line: Line) -> float:
 
 @inlined
 def paid_out(line: Line) -> float:
-    """Return the length that has left the drum by level NOW, with what lies loose before it. [m]."""
+    """Return the length that has left the drum by level NOW, with the loose cable in front of it. [m]."""
     return in_water(line) + line.ends.loose[NOW]
 
 
@@ -283,6 +290,7 @@ def spacing(line: Line) -> float:
     layout, settled = line.ends.layout, line.ends.settled
     share = 1.0
     if layout.run_in > 0.0:
+        # Shorter near the tow point, where a cable of no length begins.
         share = min(1.0, np.sqrt(settled / layout.run_in) + 0.25 * layout.segment_length / layout.run_in)
     return share * layout.segment_length + layout.grading * settled
 
@@ -291,10 +299,12 @@ def spacing(line: Line) -> float:
 def sample_water(line: Line, water: Water, time: float) -> None:
     """Fill the water's velocity at the nodes of level NEW."""
     x, J, uniform = line.position[NEW], line.water[NEW], water.velocity
+    # A uniform current does not depend on places.
     if uniform.shape[0] == 1:
         for j in range(line.ends.count + 1):
             for i in range(3):
                 J[j, i] = uniform[0, i]
         return
+    # Places on level NEW: the water is sampled for the predicted shape.
     for j in range(line.ends.count + 1):
         J[j, 0], J[j, 1], J[j, 2] = water_velocity(water, x[j, 0], x[j, 1], x[j, 2], time)

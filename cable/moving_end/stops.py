@@ -1,4 +1,4 @@
-"""Why a run of the default scheme stopped: when, where, and what cures such stops.
+"""Why a run of the default scheme stopped: when, where, and the remedy for such stops.
 
 What to try was found on random trials that stop (`python -m benchmarks.stops` follows the advice, and counts): a limp
 cable wants shorter steps; a stiff one longer segments, in which it cannot fold (shorter steps make it worse); one that
@@ -20,11 +20,11 @@ EQUATIONS = ("length", "northward balance", "eastward balance", "downward balanc
 NEARLY_TAUT = 0.999
 """A cable whose ends are this share of its length apart, or more, and that has no solution, is too short."""
 SHORT_SEGMENTS = 3.0
-"""A cable of fewer segments than this has hardly begun."""
+"""A cable of fewer segments than this has hardly left the drum."""
 
 
 class Names(NamedTuple):
-    """What the settings are called where the advice is read."""
+    """The names of the settings where the advice is read."""
 
     step: str = "step"
     segment: str = "segment_length"
@@ -36,15 +36,16 @@ class Names(NamedTuple):
 def describe_stop(
     time: float, line: Line, drum: DrumNumbers, c: CableNumbers, names: Names | None = None
 ) -> str:
-    """Return why a run could not go on beyond `time` [s], where, and what to try.
+    """Return why a run could not go on beyond `time` [s], where, and the advice.
 
     Args:
         time: of the last result. [s]
-        line: the cable, with what was tried on level NEW.
+        line: the cable, with the failed step on level NEW.
         drum: the drum or winch.
         c: the cable's numbers.
         names: of the settings.
     """
+    # The most specific cause comes first; the last message is for all others.
     words, solved = names or Names(), line.ends.solved
     way = float(np.linalg.norm(line.position[NEW, 0] - drum.place))
     if drum.control == LENGTH and way >= NEARLY_TAUT * drum.setpoint:
@@ -52,11 +53,13 @@ def describe_stop(
             f"The cable is too short beyond t = {time:g} s: the winch has paid out {drum.setpoint:.5g} m, the vehicle "
             f"is {way:.5g} m away. Try {words.yielding}, or a higher {words.rate}."
         )
+    # The step was solved, but there is no space for more cable.
     if solved.converged:
         return (
             f"The drum has given far more cable until t = {time:g} s than the ways of its ends ask for: nothing holds "
             "it back. Try more friction_torque, or a winch."
         )
+    # The residual is within its tolerance: the step was refused because it takes up cable (`time_step`).
     if solved.residual <= 1.0 and drum.control == FREE:
         return (
             f"The cable would push itself back onto the drum beyond t = {time:g} s, and a free drum takes none up. "
@@ -78,7 +81,7 @@ def _worst(line: Line) -> str:
 
 
 def _remedy(line: Line, drum: DrumNumbers, c: CableNumbers, words: Names) -> str:
-    """Return what cures most stops of this kind, the surest first."""
+    """Return the remedy for most stops of this kind, the surest first."""
     if hasattr(c, "bending_stiffness"):
         return f"a longer {words.segment}, or bending_stiffness = 0"
     length = float(line.ends.settled + line.ends.last_length[NOW])

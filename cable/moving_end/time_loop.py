@@ -1,12 +1,12 @@
 """The compiled loop of a cable whose tow point moves on a given path; steps that fail or err are retried smaller.
 
-`pull_out` and `tow` lay a cable out, let it follow a sampled path, and hand back its history.
+`pull_out` and `tow` lay a cable out, move it along a sampled path, and return its history.
 
 Where an error is allowed (`rtol`), it is estimated, and the next step is the one that would just be allowed. A
 backward difference of second order errs by h(h + h')/6 x‴ in the velocity V, that is by h(h + h')/6 V̈. The tow force
 goes about with the square of the velocity, so it errs by h(h + h')/6 F̈ or so, while the force that is extrapolated
 from the two steps before is off by h(h + h')/2 F̈. A third of that gap, as a share of the largest force so far, is
-what is taken for the error.
+the error estimate.
 """
 
 from __future__ import annotations
@@ -54,11 +54,12 @@ MOST_CUTS = 6
 """A step that errs too much is made smaller by this many halvings at most, and so are those behind it: a jolt has no
 accurate step, and in ever smaller ones it only rings louder."""
 FIRST_STEP = 0.1
-"""With an error allowed, a run begins, and goes on after a jolt, with this share of a row: it cannot tell its error."""
+"""With `rtol` given, the first step of a run, or after a jolt, is this share of a row, as it has no error
+estimate."""
 
 
 class Record(NamedTuple):
-    """What a run keeps, one row per step; shapes are packed one behind another.
+    """The results of a run, one row per step; shapes are packed one after another.
 
     Attributes:
         tow_force: force on the vehicle, earth axes (n, 3). [N]
@@ -87,7 +88,7 @@ class Record(NamedTuple):
 
 
 def new_record(rows: int, capacity: int) -> Record:
-    """Return an empty record with room for `rows` rows and a line that grows to `capacity` segments."""
+    """Return an empty record with space for `rows` rows and a line that grows to `capacity` segments."""
     nodes = rows * (capacity + 2)
     per_row = {name: np.zeros(rows) for name in ("tow_tension", "drum_tension", "length", "courant")}
     counts = {name: np.zeros(rows, np.int64) for name in ("segments", "iterations", "steps")}
@@ -119,7 +120,7 @@ def follow_path(
     Args:
         line: the cable at path.times[0]; changed.
         path: how the tow point moves.
-        led: how the drum moves, and what its winch is asked for, see `cable.drum_motion`.
+        led: motion of the drum, and setpoint of its winch, see `cable.drum_motion`.
         water: how the water moves.
         c: cable.
         drum: drum or winch.
@@ -128,8 +129,9 @@ def follow_path(
         record: filled from row 0 on, the start.
 
     Returns:
-        how many rows are filled: all, unless it failed; `line.ends.solved` tells how the last step was solved.
+        the number of filled rows: all, unless it failed; `line.ends.solved` holds how the last step was solved.
     """
+    # A row takes one node more than it has segments, and rows are packed without gaps.
     rows, used = path.times.size, line.ends.count + 1
     suggested = FIRST_STEP * (path.times[1] - path.times[0])
     note_force(line)
@@ -137,6 +139,7 @@ def follow_path(
     write_row(line, record, 0, 0, c)
     for k in range(1, rows):
         suggested = _cover(line, path, k, led, water, c, drum, rtol, suggested, work, record)
+        # Out of memory for a row is treated like a step that failed: the caller keeps the rows that are filled.
         if not line.ends.solved.converged or used + line.ends.count + 1 > record.tension.size:
             return k
         write_row(line, record, k, used, c)
@@ -163,11 +166,13 @@ def _cover(
     whole = path.times[k] - path.times[k - 1]
     finest, done, spent, point = whole * 0.5**MOST_CUTS, 0.0, 0, np.zeros(3)
     jump = path.leaving[k - 1] - path.arriving[k - 1]
+    # In row 1 the jump from rest is part of the initial state, which `lay_straight` has filled.
     if k > 1 and take_jolt(line, jump, c, drum, work, record.impulse[k - 1]):
         energy_flow(line, c, work, record.ledger[1])
         suggested = min(suggested, FIRST_STEP * whole)
     step = min(suggested, whole) if rtol > 0.0 else whole
     while True:
+        # The rest of the row is divided evenly, so that the last step is not tiny.
         step = (whole - done) / np.ceil((whole - done) / step - 1e-9)
         x, near, far = (done + step) / whole, path.place[k - 1], path.place[k]
         hermite(near, far, path.leaving[k - 1], path.arriving[k], whole, x, point)
@@ -176,6 +181,7 @@ def _cover(
         converged = try_step(line, step, point, water, c, drum, work)
         spent += line.ends.solved.iterations
         error = estimate_error(line, step) if rtol > 0.0 and converged else 0.0
+        # The smallest step is accepted with any error: a jolt has no accurate one.
         if converged and (error <= rtol or step <= finest * (1.0 + 1e-6)):
             accept(line, step, c, work)
             note_force(line)
@@ -188,6 +194,7 @@ def _cover(
                 return suggested
             step = suggested
         else:
+            # A rejected step may have changed the state of the drum.
             line.ends.drum_mode = mode
             step = max(next_step(step, error, rtol), finest) if converged else 0.5 * step
             if step < whole * 0.5**MOST_HALVINGS:
@@ -196,7 +203,7 @@ def _cover(
 
 @compiled
 def write_row(line: Line, record: Record, k: int, used: int, c: CableNumbers) -> None:
-    """Write row k of a record, with the shape of level NOW behind the `used` nodes that are there already."""
+    """Write row k of a record, with the shape of level NOW after the `used` nodes that are there already."""
     N = line.ends.count
     record.tow_tension[k], record.drum_tension[k] = end_tensions(line)
     record.length[k] = paid_out(line)
@@ -225,6 +232,7 @@ def pull_out(task: PullOut, scheme: MovingEnd) -> History:
     line.ends.layout.segment_length, line.ends.layout.grading = segment_length, scheme.grading
     line.ends.solver.tolerance, line.ends.layout.run_in = scheme.tolerance, scheme.run_in
     c, drum = task.cable.numbers(), task.drum.numbers()
+    # The velocity of the drum at the start is needed before the first step sets it.
     drum.velocity[:] = led[0, VELOCITY:SETPOINT]
     if isinstance(start, Equilibrium):
         rate = (led[1, SETPOINT] - led[0, SETPOINT]) / path.times[1] if drum.control == LENGTH else 0.0
@@ -249,6 +257,7 @@ def tow(task: Tow, scheme: MovingEnd) -> History:
     line.ends.solver.tolerance = scheme.tolerance
     set_steady_tow(line, path.leaving[0], J, task.cable, tail_drag)
     path.place[:] += line.position[NOW, 0]
+    # Places are counted from the tail: with this origin the tow point starts at (0, 0, 0), where J was taken.
     origin = -line.position[NOW, 0]
     return _run(line, path, resting(path.times), task.current.numbers(origin), c, idle, scheme.rtol)
 
@@ -266,16 +275,18 @@ def led_drum(task: PullOut, times: np.ndarray) -> np.ndarray:
 
 
 def _capacity(task: PullOut, path: TowPath, led: np.ndarray, segment_length: float, scheme: MovingEnd) -> int:
-    """Return for how many segments there has to be room; refuse what does not fit into memory.
+    """Return the number of segments to allocate; raise an error if they do not fit into memory.
 
-    A winch says how much cable there will be. A free drum gives what the ways of both ends and the current ask for, and
-    some of its own accord; room is made for three times their sum and 5 m more, and `stops` tells where that ends.
+    For a winch the longest cable is known. A free drum gives the cable that the ways of both ends and the current
+    require, and some by its own motion; space is allocated for three times their sum and 5 m more, and `stops`
+    reports where that is exceeded.
     """
     if isinstance(task.drum, PayOutRate | Brake):
         longest = float(led[:, SETPOINT].max())
     else:
         ways = length_of_way(path.place) + length_of_way(led[:, PLACE:VELOCITY])
         reach = 1.5 * (ways + task.current.fastest * task.duration) + task.wet_length
+        # Space for twice the reach, and 5 m: the arrays of a compiled run cannot grow.
         longest = 2.0 * reach + 5.0
     capacity = segments_needed(longest, segment_length, scheme.grading) + int(scheme.run_in / segment_length)
     if isinstance(task.start, Equilibrium):
@@ -304,9 +315,10 @@ def _run(
 
 
 def as_history(path: TowPath, record: Record, rows: int, solved: Solved, trouble: str) -> History:
-    """Return the record's filled rows as a history; `trouble` says what stopped it, if it was stopped."""
+    """Return the record's filled rows as a history; `trouble` is the reason if it was stopped."""
     times, tow, completed = path.times, path.place, rows == path.times.size
     message = "The run reached its end." if completed else trouble
+    # Shapes are packed in one array; the cuts are the first nodes of the rows.
     cuts = np.cumsum(record.segments[:rows] + 1).tolist()
     parts = [slice(first, last) for first, last in zip([0, *cuts], cuts, strict=False)]
     return History(
@@ -338,10 +350,11 @@ LARGEST_GROWTH, LARGEST_CUT = 2.0, 0.2
 
 @inner
 def estimate_error(line: Line, step: float) -> float:
-    """Return the relative error of the tow force on level NEW; 0 when there is no history to tell. [-]."""
+    """Return the relative error of the tow force on level NEW; 0 when there are too few steps to estimate it. [-]."""
     if line.ends.previous_step <= 0.0:
         return 0.0
     ratio, F, past = step / line.ends.previous_step, line.ends.tow.force, line.ends.tow.past
+    # F is compared with its linear extrapolation from two steps (see the module).
     gap, size = 0.0, line.ends.tow.largest * line.ends.tow.largest
     for i in range(3):
         gap += (F[i] - past[0, i] - ratio * (past[0, i] - past[1, i])) ** 2
@@ -364,4 +377,5 @@ def next_step(step: float, error: float, rtol: float) -> float:
     """Return the step that would err by a little less than `rtol`, given that `step` errs by `error`. [s]."""
     if error <= 0.0 or rtol <= 0.0:
         return LARGEST_GROWTH * step
+    # Limits on the change keep one odd estimate from changing the step by orders of magnitude.
     return step * min(max(SAFETY * sqrt(rtol / error), LARGEST_CUT), LARGEST_GROWTH)

@@ -1,11 +1,11 @@
-"""Solve one step: guess it, and let Newton's method make the guess right.
+"""Solve one step: predict it, and correct the prediction by Newton's method.
 
 `try_step` solves for a new tow-point position without forgetting where the cable was, so a vehicle and its cable
 can ask "what if" until they agree; `remeshing.accept` then makes the answer the present state.
 
 What the drum does in the step (turn, stand, spin ahead of the cable) is guessed from the step before, and changed
 when the answer contradicts it (`cable.drum`). Newton's method is damped, bounded in iterations, and always has an
-outcome. From its last matrix follows how the tow force, and all the cable, answers to the tow point.
+outcome. Its last matrix gives the response of the tow force, and of all the cable, to the tow point.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ TAUT = 1e-2
 TAKEN_UP = 1e-9
 """A free drum that would take up more cable than this in a step has not been solved: try a smaller one. [m]"""
 MOST_DRUM_CHANGES = 4
-"""How often one step may change its mind about what the drum does."""
+"""How often the state of the drum may change within the solution of one step."""
 MAX_ITERATIONS = 40
 MAX_HALVINGS = 8
 ABSOLUTE_TOLERANCE = 1e-13
@@ -75,18 +75,20 @@ def try_step(
     Return whether there is a solution; `line.ends.solved` says how it was found.
 
     Args:
-        line: the cable; levels NOW and BEFORE stay untouched.
+        line: the cable; levels NOW and BEFORE are not changed.
         step: Δt. [s]
         tow: position of the tow point at the new time, earth axes (3,). [m]
         water: how the water moves.
         c: cable.
         drum: drum, with its place and velocity at the new time.
         work: work space.
-        again: level NEW holds the answer to another tow point, close by.
+        again: level NEW holds the solution for another tow point, close by.
     """
     failed, converged = 0, False
+    # The solution may show that the drum is in another state than assumed: solve again in that state.
     for change in range(MOST_DRUM_CHANGES):
         converged = _solve_softly(line, step, tow, water, c, drum, work, again and change == 0)
+        # With one segment, a winch or a free end the drum has one state only.
         if line.ends.count == 1 or drum.control != FREE or line.ends.layout.free_end:
             break
         ends = line.ends
@@ -94,6 +96,7 @@ def try_step(
             ends.drum_mode, converged, rate_taken(line, 1.0 / step), ends.loose[NEW], ends.drum_pull, drum
         )
         if not converged or (mode == STANDING and ends.drum_mode == SPINNING):
+            # A bit for each state without a solution, so that the loop does not return to it.
             failed |= 1 << line.ends.drum_mode  # a line that would take loose cable back stands
         if mode == line.ends.drum_mode or (failed >> mode) & 1:
             break
@@ -107,7 +110,7 @@ def try_step(
 
 @inlined
 def _takes_up(line: Line, drum: DrumNumbers) -> bool:
-    """Say whether a free drum would have taken up cable."""
+    """Return whether a free drum would have taken up cable."""
     taken_up = line.ends.last_length[NOW] - line.ends.last_length[NEW] > TAKEN_UP
     return taken_up and drum.control == FREE and not line.ends.layout.free_end
 
@@ -123,8 +126,8 @@ def _solve_softly(
     work: Load,
     again: bool,
 ) -> bool:
-    """Solve from the answer to a tow point close by, if there is one; else, or if that leads astray, from a prediction;
-    if that fails, with a slack law that is made sharp little by little.
+    """Solve from the solution for a tow point close by, if there is one; if there is none, or if Newton's method does
+    not converge from it, solve from a prediction; if that fails, with a slack law that is sharpened in stages.
     """
     w = backward_weights(step, line.ends.previous_step)
     if (
@@ -137,9 +140,11 @@ def _solve_softly(
     _predict(line, step, tow, water, c, drum, work)
     if solve_step(line, w, c, drum, work, False):
         return True
+    # Last attempt: a softer slack law lets Newton's method converge from farther away.
     _predict(line, step, tow, water, c, drum, work)
     pull = drum.friction + abs(c.weight) * (line.ends.settled + line.ends.last_length[NOW])
     for j in range(1, line.ends.count + 1):
+        # All segments start taut, with at least the tension that friction and weight can cause.
         line.tension[NEW, j] = max(line.tension[NEW, j], pull)
     spent = line.ends.solved.iterations
     line.ends.solver.smoothing = SOFTEST
@@ -148,6 +153,7 @@ def _solve_softly(
         spent += line.ends.solved.iterations
         if not converged or line.ends.solver.smoothing <= SMOOTHING:
             break
+        # The solution for one smoothing is the first guess for the next, ten times as sharp.
         line.ends.solver.smoothing = max(0.1 * line.ends.solver.smoothing, SMOOTHING)
     line.ends.solver.smoothing = SMOOTHING
     line.ends.solved.iterations = spent
@@ -158,11 +164,12 @@ def _solve_softly(
 def _predict(
     line: Line, step: float, tow: np.ndarray, water: Water, c: CableNumbers, drum: DrumNumbers, work: Load
 ) -> None:
-    """Guess level NEW: everything goes on as it moves, tensions stay; and what is held at its prediction."""
+    """Predict level NEW by extrapolation, and fill the quantities that are fixed while a step is solved."""
     N, held = line.ends.count, held_node(line)
     ratio = step / line.ends.previous_step if line.ends.previous_step > 0.0 else 0.0
     for j in range(N + 1):
         tension = line.tension[NOW, j] + ratio * (line.tension[NOW, j] - line.tension[BEFORE, j])
+        # An extrapolation that is slack is replaced by the present tension, or by `TAUT` if that is larger.
         line.tension[NEW, j] = tension if tension > KNOWN else max(line.tension[NOW, j], TAUT)
         for i in range(3):
             change = ratio * (line.velocity[NOW, j, i] - line.velocity[BEFORE, j, i])
@@ -175,6 +182,7 @@ def _predict(
         line.ends.drum_velocity[i] = drum.velocity[i]
     rate, last = line.ends.payout, line.ends.last_length
     growth = step * (rate[NOW] + 0.5 * ratio * (rate[NOW] - rate[BEFORE]))
+    # The last segment is predicted to shrink to half of its length at most: a length has to remain positive.
     last[NEW] = max(last[NOW] + (0.0 if line.ends.drum_mode == STANDING else growth), 0.5 * last[NOW])
     if not line.ends.layout.free_end:
         pull = max(line.node_tension[N], 0.0)
@@ -194,18 +202,20 @@ def solve_step(
     work: Load,
     near: bool,
 ) -> bool:
-    """Solve the equations of `assembly` for level NEW, from the guess that stands there; return whether that went well,
-    and leave in `line.ends.solved` how. One that is as `near` as that
-    of `follow_tow` is likely to be right: no matrix is made until the residual says that it is not.
+    """Solve the equations of `assembly` for level NEW, from the guess in it; return whether the iteration converged,
+    and report in `line.ends.solved` how. A guess as `near` as that of `follow_tow` is likely to be right: no matrix
+    is made unless the residual shows that it is not.
 
-    The matrix is made anew for every step: a kept one converges to the tolerance only, and what is left then differs
-    from run to run, which sensitivities by differences see. Whether a guess will do, the residual tells by itself.
+    The matrix is computed for every step: a kept one converges to the tolerance only, and the remaining error then
+    differs from run to run, which shows in sensitivities by differences. The residual alone shows whether a guess is
+    good enough.
     """
     rounding, alone = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0, has_residual(line, c)
     made = not near
     _residual(line, w, c, drum, work, near)
     merit = _merit(line)
     for iteration in range(MAX_ITERATIONS):
+        # `merit` decides on the length of a Newton step, `size`, in tolerances, on convergence.
         size = _size(line, rounding, merit)
         if size <= 1.0:
             return _solved(line, iteration, size)
@@ -215,11 +225,14 @@ def solve_step(
         if not line.ends.solver.factored:
             break
         last_length, before, fraction = save_guess(line), merit, 1.0
+        # Far from the solution another iteration is certain, so its matrix is computed together with the residual.
         made = before > FAR or not alone
         for _ in range(MAX_HALVINGS):
             go_from_guess(line, last_length, fraction)
             _residual(line, w, c, drum, work, not made)
             merit = _merit(line)
+            # A residual has to fall by enough, and NaN never does; below `NEARLY` rounding decides, so any is
+            # accepted.
             if isfinite(merit) and merit <= max(before * (1.0 - 0.1 * fraction), NEARLY):
                 break
             fraction *= 0.5
@@ -231,7 +244,7 @@ def solve_step(
 
 @compiled
 def _residual(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load, alone: bool) -> None:
-    """Fill the residual: `alone`, so that the factors of the last matrix stay, or with the matrix."""
+    """Fill the residual: `alone`, so that the factors of the last matrix are kept, or with the matrix."""
     if alone:
         assemble_residual(line, w, c, drum, work)
     else:
@@ -262,6 +275,7 @@ def go_from_guess(line: Line, last_length: float, fraction: float) -> None:
                 line.position[NEW, j, i] = guess[j, 1 + i] - fraction * step[j, 1 + i]
     if line.ends.layout.free_end:
         return
+    # A Newton step may not make the last segment negative: it shrinks to a tenth at most.
     line.ends.last_length[NEW] = max(last_length - fraction * step[N, 1], 0.1 * last_length, SMALLEST_SEGMENT)
 
 
@@ -276,6 +290,7 @@ def _tolerances(line: Line, rounding: float) -> tuple[float, float]:
     for j in range(1, line.ends.count + 1):
         tension = max(tension, abs(line.tension[NEW, j]))
         reach = max(reach, abs(x[NEW, j, 0]), abs(x[NEW, j, 1]), abs(x[NEW, j, 2]))
+    # Lengths are differences of coordinates, so the rounding of large coordinates limits their accuracy.
     known = 2.0 * ROUNDING / STRAIN_SCALE * reach / max(line.length[1], SMALLEST_SEGMENT)
     strain = line.ends.solver.tolerance + known
     return strain, line.ends.solver.tolerance * tension + ABSOLUTE_TOLERANCE + rounding * line.length[
@@ -304,18 +319,19 @@ def _solved(line: Line, iterations: int, size: float) -> bool:
 
 @compiled
 def _failed(line: Line, rounding: float) -> bool:
-    """Note that it did not converge, and where the worst equation stands."""
+    """Report that it did not converge, and the place of the worst equation."""
     strain, allowed = _tolerances(line, rounding)
     worst, node, equation = 0.0, 0, 0
     for j in range(1, line.ends.count + 1):
         for i in range(4):
             size = abs(line.rows[RESIDUAL, j, i]) / (strain if i == 0 else allowed)
+            # Once the worst value is NaN, worst == worst is false, so the first NaN is reported.
             if worst == worst and not size <= worst:
                 worst, node, equation = size, j, i
     solved = line.ends.solved
     solved.converged, solved.iterations, solved.residual = False, MAX_ITERATIONS, worst
     solved.worst_node, solved.worst_equation = node, equation
-    line.ends.solver.factored = False  # of a matrix that led astray
+    line.ends.solver.factored = False  # the matrix belongs to an iteration that did not converge
     return False
 
 
@@ -345,18 +361,20 @@ def impedance(line: Line, Z: np.ndarray) -> None:
     for i in range(3):
         for k in range(3):
             Z[i, k] = line.ends.tow.by_tow[i, k]
+            # The direct derivative plus the response of the first block: the chain rule over the whole cable.
             for m in range(4):
                 Z[i, k] -= line.ends.tow.by_block[i, m] * line.ends.tow.answer[k, m]
 
 
 @compiled
 def _relax(line: Line, gap: np.ndarray) -> None:
-    """Move all of level NEW as the last matrix has it answer to a tow point that is moved by `gap` (3,). [m]."""
+    """Move all of level NEW by the response of the last matrix to a displacement `gap` (3,) of the tow point. [m]."""
     step, L = line.rows[RESIDUAL], line.blocks[LOWER]
     for j in range(1, line.ends.count + 1):
         for m in range(SIZE):
             step[j, m] = 0.0
     for m in range(SIZE):
+        # The displacement enters the first block only; `spread` carries it to the others.
         for i in range(3):
             step[1, m] += L[1, m, 1 + i] * gap[i]
     spread(L, line.ends.count, step)
@@ -367,7 +385,7 @@ def _relax(line: Line, gap: np.ndarray) -> None:
 def follow_tow(line: Line, tow: np.ndarray) -> bool:
     """Move the tow point of the answer on level NEW, and all that moves with it by the factors of the last matrix.
 
-    False, and nothing has moved, if there are none.
+    Return False, and move nothing, if there are none.
     """
     if not line.ends.solver.factored:
         return False

@@ -42,12 +42,12 @@ SIZE = 1e-5
 SMALLEST = 1e-8
 """Where the disturbed steps do not do the same, such as to split a segment, smaller ones are tried down to this."""
 ROOM = 32.0
-"""Room for cable to begin with, beyond what is out; doubled as often as needed. [m]"""
+"""Initial capacity for cable, beyond the cable that is out; doubled as often as needed. [m]"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Along:
-    """A run, and how it answers to small deviations; from `linearise_along`.
+    """A run, and its response to small deviations; from `linearise_along`.
 
     Attributes:
         time: of the run, one cable step apart (n + 1,). [s]
@@ -161,10 +161,10 @@ def linearise_along(
     Steps and segments are those of `subzero.simulate`: finer than the trial's where its `rtol` asks for it.
 
     Args:
-        scenario: what is run: its start, commands, water and steps.
+        scenario: the scenario to run: its start, commands, water and steps.
         model: another model than the scenario's.
         start: a steady motion to begin with instead, its cable straight behind, its commands held to the end; heading,
-            depth and steps stay the scenario's, as they are.
+            depth and steps remain those of the scenario.
         duration: how long; the scenario's by default. [s]
 
     Raises:
@@ -191,14 +191,14 @@ def linearise_along(
             name: getattr(trial, name) for name in ("cable_step", "hull_step", "segment_length", "grading")
         }
         trial = blank_trial(model, x, start.wet_length, steps)
-    room = trial.start.wet_length + ROOM
+    capacity = trial.start.wet_length + ROOM
     while True:
-        step = Tethered(trial, model, room, x=x, exact=True)
+        step = Tethered(trial, model, capacity, x=x, exact=True)
         try:
             states = _run(step, time, commands, parts)
             return Along(time=time, commands=commands, parts=parts, states=states, step=step)
         except NoRoomError:
-            room *= 2.0
+            capacity *= 2.0
 
 
 def _commands(trial: Trial, time: np.ndarray) -> np.ndarray:

@@ -35,7 +35,7 @@ from numpy.polynomial import Legendre, Polynomial
 from subzero.model import Model
 
 BENDS = 6
-"""Number of shape functions beside the straight line."""
+"""Number of shape functions in addition to the straight line."""
 LOST_OVER = 1.0
 """Waves shorter than about this are damped within their own length. [m]"""
 NEAR_DRUM = 0.5

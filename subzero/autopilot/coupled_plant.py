@@ -56,13 +56,14 @@ CABLE_OUTPUTS = (
     "cable_moment_pitch",
     "cable_moment_yaw",
 )
-"""What the tethered plant gives beside its hull's states, as channels of `subzero.channels` [m, N, N m]."""
+"""Outputs of the tethered plant in addition to its hull's states, as channels of `subzero.channels` [m, N, N m]."""
 
 HIDDEN = ("battery_charge", "rudder_linkage", "stern_plane_port_linkage", "stern_plane_starboard_linkage")
 """States of the hull that only the tethered plant has [C, rad]."""
 HULL_SIZE = len(STATE_NAMES) + len(HIDDEN)
 EXACT = 1e-12
-"""How exactly a step is solved for differences of it: what is left of cable forces, and between hull and cable. [-]"""
+"""Tolerance of a step whose differences are taken: remaining error of cable forces, and between hull and cable.
+[-]"""
 
 
 def blank_trial(model: Model, x: np.ndarray, wet_length: float, steps: dict[str, float]) -> Trial:
@@ -82,7 +83,7 @@ def blank_trial(model: Model, x: np.ndarray, wet_length: float, steps: dict[str,
 
 
 class NoRoomError(UserError):
-    """More cable than there is room for."""
+    """A start or a step needs more cable than was allocated."""
 
 
 class Tethered:
@@ -91,7 +92,7 @@ class Tethered:
     Args:
         trial: where it starts, and its steps; its commands are not used.
         model: vehicle, cable, drum and water.
-        longest: length of cable that there is room for. [m]
+        longest: length of cable to allocate. [m]
         x: state of the hull to start with (16,), other than the trial's.
         exact: solve every step to rounding, for derivatives by differences.
 
@@ -107,8 +108,8 @@ class Tethered:
         self._setup = self._setup._replace(orders=Orders(np.zeros(1), np.zeros((1, 4))))
         if exact:
             live.line.ends.solver.tolerance, self._setup.fixed.agreement = EXACT, EXACT
-        room = int((longest + RUN_IN) / trial.segment_length) + SPARE + 4
-        self._live = live._replace(line=enlarged(live.line, max(room, live.line.length.size)))
+        capacity = int((longest + RUN_IN) / trial.segment_length) + SPARE + 4
+        self._live = live._replace(line=enlarged(live.line, max(capacity, live.line.length.size)))
         self._memory = Memory(self._live)
         self._recording = new_recording(2, 4 * self._live.line.length.size)
         self._r_c = model.vehicle.tow_point.position()
@@ -155,7 +156,7 @@ class Tethered:
         return np.concatenate([hull, hidden, self._memory.read()])
 
     def events(self, x: np.ndarray) -> tuple[float, float]:
-        """Return what changes at once in a cable: the number of its segments, and what its drum does."""
+        """Return the discrete state of a cable: the number of its segments, and the state of its drum."""
         flat, places = x[HULL_SIZE:], self._memory.places
         return float(flat[places["count"]][0]), float(flat[places["drum_mode"]][0])
 
@@ -173,7 +174,8 @@ class Tethered:
 
 
 NOT_KEPT = ("blocks", "pivots", "rows", "load", "slip", "normal_gain", "forcing", "solved")
-"""Fields of `cable.moving_end.state.Line` and its ends that a step fills before it reads them, or that stay zero."""
+"""Fields of `cable.moving_end.state.Line` and its ends that a step fills before it reads them, or that remain
+zero."""
 OF_NOW = ("force", "force_before", "last_step")
 """Fields of `subzero.engine.run_state.Now` that a step leaves for the next."""
 
@@ -196,7 +198,7 @@ class Memory:
         self.size = int(ends[-1])
 
     def read(self) -> np.ndarray:
-        """Return the numbers as they stand (size,)."""
+        """Return the numbers, packed (size,)."""
         return np.concatenate([view.ravel().astype(float) for view in self._views.values()])
 
     def write(self, flat: np.ndarray) -> None:
@@ -215,7 +217,7 @@ def _numbers_of(name: str, memory: np.ndarray) -> Iterator[tuple[str, np.ndarray
 
 
 def _views(live: Live) -> Iterator[tuple[str, np.ndarray]]:
-    """Walk through what is kept: name, view of the memory."""
+    """Iterate over the kept state: name, view of the memory."""
     for name in OF_NOW:
         yield name, live.now.memory_of(name)
     for name in live.line.ends.names:
@@ -234,10 +236,10 @@ class Discretisation:
         sample_time: of the plant: one exchange of hull and cable. [s]
         hull_step: time step of the hull. [s]
         segment_length: of the cable. [m]
-        longest: length of cable that there is room for. [m]
+        longest: length of cable to allocate. [m]
 
     Raises:
-        UserError: what is no positive number; a sample time shorter than the hull's step.
+        UserError: a value that is not a positive number; a sample time shorter than the hull's step.
     """
 
     sample_time: float = 0.1
@@ -246,7 +248,9 @@ class Discretisation:
     longest: float = 50.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no step and no length, and a sample without a step of the hull."""
+        """Raise an error for a step or a length that is not valid, and for a sample shorter than a step of the
+        hull.
+        """
         for field in fields(self):
             value = checked("Discretisation", field.name, getattr(self, field.name), above=0.0)
             object.__setattr__(self, field.name, value)
@@ -290,10 +294,10 @@ def plant(
         start: the steady motion to begin with, its length of cable laid straight behind; at rest by default.
         depth: to begin at. [m]
         heading: to begin with. [rad]
-        discretisation: steps of the tethered plant, and its room for cable.
+        discretisation: steps of the tethered plant, and the length of cable to allocate.
 
     Raises:
-        UserError: a start with more cable than there is room for.
+        UserError: a start with more cable than was allocated.
     """
     x = np.zeros(len(STATE_NAMES)) if start is None else start.state.copy()
     x[PLACE["depth"]], x[PLACE["heading"]] = depth, heading

@@ -35,16 +35,16 @@ INTEGRAL = "integral"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Gains:
-    """What a design gives, with the matrices it was made from: δ = −feedback · x + integral ∫(wanted − y).
+    """Gains of a design, with the matrices it was made from: δ = −feedback · x + integral ∫(wanted − y).
 
     Attributes:
         states: the states that are fed back.
-        tracked: which of them follows what is wanted.
+        tracked: the state that follows the reference.
         feedback: gains of the states (n,).
         integral: gain of ∫e.
         A, B: the model with ∫e as its last state (n + 1, n + 1), (n + 1, 1); its derivative is −y.
         Q, R: the weights. (n + 1, n + 1), (1, 1)
-        ahead: what is fed forward per unit of what is wanted, beside the loop.
+        ahead: feed-forward gain, command per unit of the reference, in addition to the loop.
         loop: the loop opened at the plant's input, as a transfer from δ to δ, for margins.
     """
 
@@ -72,7 +72,7 @@ class Gains:
 
     @property
     def share(self) -> float:
-        """b: how much of a step of what is wanted goes to the proportional part; the rest is left to the integral.
+        """b: share of a step of the reference that acts on the proportional part; the rest is left to the integral.
 
         The step response has a zero at −k_I/(δ_w + b k), with δ_w `ahead`; b puts it on the slowest pole, whose long
         tail is then not excited. (Without it a step that is fed forward must overshoot: its ∫e has to end at 0.)
@@ -94,7 +94,7 @@ def reduced(part: control.StateSpace, keep: Sequence[str]) -> control.StateSpace
 
     Args:
         part: from `subsystem`.
-        keep: names of the states that stay.
+        keep: names of the states to keep.
 
     Raises:
         UserError: there is no such state, or the others cannot follow (they integrate, or are a cable's bearing).
@@ -141,11 +141,12 @@ def design_gains(
 
     Args:
         part: the linear model: all its states are fed back; from `subsystem`, or `reduced`.
-        tracked: the state that has to follow what is wanted.
+        tracked: the state that has to follow the reference.
         largest: state, or "integral" → the largest deviation that is acceptable [its unit, integral in unit·s]; a
             state that is not named costs nothing.
         largest_command: the same for the command.
-        ahead: what is fed forward per unit of what is wanted, beside this loop; it changes `Gains.share` alone.
+        ahead: feed-forward gain, command per unit of the reference, in addition to this loop; changes `Gains.share`
+            only.
 
     Raises:
         UserError: a weight of nothing, a weight that is not above 0, a loop that cannot be stabilised.
@@ -183,7 +184,7 @@ def design_gains(
 
 
 def _check_part(part: control.StateSpace) -> None:
-    """Refuse a model that the recipe does not hold for."""
+    """Raise an error for a model that the recipe does not hold for."""
     import control
 
     allowed = "Allowed: a continuous control.StateSpace with one input and no feedthrough, of finite numbers."
@@ -206,7 +207,7 @@ def _check_part(part: control.StateSpace) -> None:
 def _check_weights(
     labels: tuple[str, ...], tracked: str, largest: Mapping[str, float], largest_command: float
 ) -> None:
-    """Refuse weights that mean nothing."""
+    """Raise an error for weights that are not valid."""
     allowed = (*labels, INTEGRAL)
     for name in (tracked, *largest):
         if name not in allowed:
@@ -236,7 +237,7 @@ class Schedule:
         return cls(np.asarray(speeds, dtype=float), np.array([make(float(speed)) for speed in speeds]))
 
     def __post_init__(self) -> None:
-        """Refuse what is no schedule."""
+        """Raise an error if the fields do not form a schedule."""
         if self.speeds.ndim != 1 or self.speeds.size == 0 or np.any(np.diff(self.speeds) <= 0.0):
             raise UserError(f"Schedule: the speeds are {self.speeds}. Allowed: numbers that increase.")
         if not np.all(np.isfinite(self.values)):
@@ -259,9 +260,9 @@ class Schedule:
 
 @dataclass(frozen=True, kw_only=True)
 class Weights:
-    """What a loop feeds back, the tracked state last, and the largest acceptable deviations (`design_gains`).
+    """States that a loop feeds back, the tracked state last, and the largest acceptable deviations (`design_gains`).
 
-    `foreseen`: whether what is wanted is fed forward too, with the steady command that it needs.
+    `foreseen`: whether the reference is fed forward too, with the steady command that it needs.
     """
 
     part: str
@@ -307,7 +308,7 @@ def with_weights(name: str, **changes: float | Mapping[str, float]) -> dict[str,
 
 
 def checked(weights: dict[str, Weights]) -> dict[str, Weights]:
-    """Return weights, or refuse what they are not."""
+    """Return weights; raise an error if they are not valid."""
     for name, value in weights.items():
         if name not in WEIGHTS:
             raise UserError(

@@ -5,7 +5,7 @@
 
 Sway speed and rudder angle are not measured. The gains come from `control.lqr` with the matrices in `Gains`, the filter
 from `control.dlqe` on the model sampled at the controller's rate. Both are scheduled on the speed. The force of the
-cable is not in the filter's model: feed-forward cancels it, and the integral takes what is left.
+cable is not in the filter's model: feed-forward cancels it, and the integral removes the remainder.
 """
 
 from __future__ import annotations
@@ -165,7 +165,7 @@ class EstimatorLoop:
         return -float(np.dot(k, off)), self.sample_time * k_integral * error
 
     def _jump(self, wanted: float, speed: float, rate: float) -> float:
-        """Return what a jump of the set-point takes off the integral, as in `loops`."""
+        """Return the change of the integral at a jump of the set-point, as in `loops`."""
         assert self.estimate is not None
         before = wanted if self._wanted is None else self._wanted + rate * self.sample_time
         self._wanted = wanted

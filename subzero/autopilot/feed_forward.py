@@ -2,8 +2,8 @@
 
 There are two estimators; neither sees the true state. `FormulaCable` takes cable length, speed and yaw rate as
 measured, and a reduced model of the cable in a turn (`CableInTurn`). `TwinCable` is a simulation of vehicle and cable
-that runs beside the controller under the same commands; its force is scaled with the length of cable that the drum has
-really paid out.
+that runs in parallel with the controller under the same commands; its force is scaled with the length of cable that
+the drum has really paid out.
 
 The reduced model: a light cable without stretch slides along itself and is dragged sideways where it is curved. At the
 tow point, with the speed V there split along and across the cable, V_t = V cos α and V_n = V sin α:
@@ -12,10 +12,10 @@ tow point, with the speed V there split along and across the cable, V_t = V cos 
     dV_t/ds = −κ V_n                              the curve that is cut off is not paid out: the drum turns slower
     T = C_f/R_d + ½ρπdC_t ∫V_t² ds
 
-(∂V_n/∂s beside V_t κ is taken for a straight line to the drum: good enough where it is small.) Between the tow point
-and the drum V_t falls from V cos α to the drum's S'; where on the way it does, is taken from where κ V_n was lost when
-the tow point came by. Then the integral needs no memory of the way but the sums P = ∫dp, A = ∫κ|V_n| dp, ∫A dp and
-∫A² dp along it:
+(Next to V_t κ, ∂V_n/∂s is taken for a straight line to the drum: good enough where it is small.) Between the tow
+point and the drum V_t falls from V cos α to the drum's S'; where on the way it does, is taken from where κ V_n was
+lost when the tow point came by. Then the integral needs no memory of the way but the sums P = ∫dp, A = ∫κ|V_n| dp,
+∫A dp and ∫A² dp along it:
 
     V_t(p) = S' + (V cos α − S') A(p)/A
 """
@@ -91,7 +91,7 @@ class CableInTurn:
 
         Args:
             length: of the cable in the water. [m]
-            paid_out: S', how fast the drum lets it go. [m/s]
+            paid_out: S', the rate at which the drum gives cable. [m/s]
             forward: speed of the tow point through the water along the hull. [m/s]
             starboard: across it. [m/s]
         """
@@ -117,7 +117,7 @@ class CableModel(ABC):
     """An estimator of the cable's force on the hull. To write one:
 
     1. `reset` begins again at the start of a run.
-    2. `wrench` is called once a sample, in order, with what the sensors tell and the command of the sample before; it
+    2. `wrench` is called once a sample, in order, with the readings of the sensors and the previous command; it
        returns force and moment of the cable on the hull (6,), body axes, about the hull centre [N, N m].
     3. It never looks at anything else.
     """
@@ -132,7 +132,7 @@ class CableModel(ABC):
 
 
 def _refuse_unknown_length(reading: Observation) -> None:
-    """Refuse a cable length that no sensor measures: feed-forward would silently be 0."""
+    """Raise an error if no sensor measures the cable length: feed-forward would silently be 0."""
     if reading.cable_length != reading.cable_length:
         raise UserError(
             f"at t = {reading.time:g} s no sensor measures the cable's length (cable_length), which feed-forward needs."
@@ -199,12 +199,13 @@ class FormulaCable(CableModel):
 
 
 class TwinCable(CableModel):
-    """A simulation that runs beside the controller under the same commands, corrected by the measured length.
+    """A simulation that runs in parallel with the controller under the same commands, corrected by the measured
+    length.
 
     Args:
         trial: where the run starts, and its steps.
         sample_time: of the controller. [s]
-        model: what is believed of vehicle, cable and water; the trial's by default.
+        model: the assumed vehicle, cable and water; the trial's by default.
     """
 
     def __init__(self, trial: scenarios.Trial, sample_time: float, model: Model | None = None) -> None:

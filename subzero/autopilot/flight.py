@@ -71,7 +71,7 @@ def fly(
         tethered: with the cable.
         model: the true model, if not the scenario's; the autopilot may be designed for another.
         sensors: through which the autopilot sees the run; `Sensors` have a seed, which is 0 for plain ones.
-        progress: told the fraction that is done.
+        progress: called with the fraction that is done.
 
     Returns:
         the run as `subzero.simulate` gives it, with wanted_speed [m/s], wanted_heading [degree], wanted_depth [m]. A
@@ -80,7 +80,7 @@ def fly(
 
     Raises:
         AutopilotError: the autopilot raised an error of its own.
-        UserError: a sample time that does not fit the trial's cable step, what is no autopilot, a goal that is none.
+        UserError: a sample time that does not fit the trial's cable step, an invalid autopilot, an invalid reference.
     """
     _check(autopilot)
     sim = Simulator(scenario, tethered=tethered, model=model, sample_time=autopilot.sample_time)
@@ -96,7 +96,7 @@ def fly(
         try:
             seen = sim.step(_command(autopilot, reported.read(seen), goal))
         except RunStoppedError:
-            break  # the result tells it
+            break  # the result reports it
         except AutopilotError:
             raise
         except UserError as error:
@@ -111,14 +111,15 @@ def fly(
 
 
 def _goal(wanted: Callable[[float], Wanted], time: float, before: float) -> Wanted:
-    """Return what is wanted at a time, in plain numbers, or refuse what is none; NaN is for who wants nothing.
+    """Return the reference at a time, in plain numbers; raise an error if it is not valid; NaN leaves a quantity
+    free.
 
     A heading that is more than a turn from the one `before` [rad], or a roll of more than half a turn, is in degrees.
     """
     given = wanted(time)
     try:
         goal = Wanted(*map(float, given))
-    except Exception:  # whatever somebody's __float__ does
+    except Exception:  # a user's __float__ may do anything
         goal = None
     if goal is None or any(map(isinf, goal)):
         raise BadValueError(
@@ -137,7 +138,7 @@ def _goal(wanted: Callable[[float], Wanted], time: float, before: float) -> Want
 
 
 def _command(autopilot: Autopilot, reading: Observation, goal: Wanted) -> Sequence[float]:
-    """Return the autopilot's command; what it raises is told with its name and the time.
+    """Return the autopilot's command; an exception that it raises is reported with its name and the time.
 
     Raises:
         CommandError: none, which the simulator would take for the scenario's own.
@@ -159,7 +160,7 @@ def _command(autopilot: Autopilot, reading: Observation, goal: Wanted) -> Sequen
 
 
 def _check(autopilot: Autopilot) -> None:
-    """Refuse what cannot fly."""
+    """Raise an error for an autopilot that cannot fly."""
     missing = [name for name in ("name", "sample_time", "reset", "update") if not hasattr(autopilot, name)]
     if missing:
         raise UserError(
@@ -168,7 +169,7 @@ def _check(autopilot: Autopilot) -> None:
 
 
 def _with_goals(run: xr.Dataset, goals: np.ndarray, trouble: str) -> xr.Dataset:
-    """Return a run with what was wanted beside what was had."""
+    """Return a run with the references next to the states."""
     held = goals[holding_rows(goals[:, 0], run["time"].values)]
     for i, (name, unit, scale) in enumerate(
         (("speed", "m/s", 1.0), ("heading", "degree", DEGREE), ("depth", "m", 1.0))

@@ -116,7 +116,7 @@ def step_response(
 
     Args:
         time: (n,). [s]
-        values: what was stepped (n,).
+        values: the stepped quantity (n,).
         goal: where to.
         start: when. [s]
         band: share of the step within which it has settled.
@@ -126,13 +126,13 @@ def step_response(
     first = float(np.interp(start, time, values))
     share = (values - first) / (goal - first)
     after = time >= start
-    outside = np.flatnonzero(after & (np.abs(share - 1.0) > band))
-    settled = float(time[min(outside[-1] + 1, time.size - 1)]) - start if outside.size else 0.0
+    beyond = np.flatnonzero(after & (np.abs(share - 1.0) > band))
+    settled = float(time[min(beyond[-1] + 1, time.size - 1)]) - start if beyond.size else 0.0
     late = time >= time[-1] - 0.1 * (time[-1] - start)
     return {
         "rise_time_s": crossing_time(time, share, 0.9, start) - crossing_time(time, share, 0.1, start),
         "overshoot": max(0.0, float(np.max(share[after])) - 1.0),
-        "settling_time_s": nan if outside.size and outside[-1] == time.size - 1 else settled,
+        "settling_time_s": nan if beyond.size and beyond[-1] == time.size - 1 else settled,
         "steady_error": float(np.mean(values[late])) - goal,
     }
 
@@ -140,7 +140,8 @@ def step_response(
 def spiral(
     time: np.ndarray, yaw_rate: np.ndarray, rudder: np.ndarray, hold: float, start: float
 ) -> dict[str, float]:
-    """Return what a Dieudonné spiral shows: slope_per_s at small rudders, loop_height_deg_s and residual_deg_s at zero.
+    """Return indices of a Dieudonné spiral: slope_per_s at small rudders, loop_height_deg_s and residual_deg_s at
+    zero.
 
     Args:
         time: (n,). [s]

@@ -9,7 +9,7 @@ limits, dead bands or play: at a command inside a dead band the true derivative 
 
 A cable pulls the heading back to the line from the drum. Only the whole picture, cable and all, may be turned about the
 drum, which is the pole at 0 that is left: it stands for the bearing, which moves on over a length S of way, not for
-the heading. What this model promises: 10 % of gain and 10° of phase from 0.3 to 4 rad/s, while the cable grows by less
+the heading. Accuracy of this model: 10 % of gain and 10° of phase from 0.3 to 4 rad/s, while the cable grows by less
 than two fifths of its length in a period (docs/autopilot.md). For anything else than a straight way there is
 `linearise_along`.
 
@@ -44,7 +44,7 @@ STEEPEST = 1e-3
 KEPT = STATE_NAMES[2:]
 """States of the linear model of a hull: all but north and east."""
 LENGTH = len(STATE_NAMES)
-"""Place of the cable's length behind the states of the hull."""
+"""Index of the cable's length, after the states of the hull."""
 
 
 class Subsystem(NamedTuple):
@@ -121,7 +121,9 @@ def cable_states() -> list[str]:
 
 
 def _check_straight(model: Model, steady: Trim) -> None:
-    """Refuse a cable that does not lie straight behind the vehicle, from a drum that turns as it is pulled."""
+    """Raise an error for a cable that does not lie straight behind the vehicle, or a drum that does not turn
+    freely.
+    """
     cable = model.cable
     angle = (abs(cable.weight_in_water) / max(cable.normal_drag, 1e-12)) ** 0.5 / steady.speed
     wrong = (
@@ -247,7 +249,7 @@ def _rows(names: tuple[str, ...], port: str, mixed: tuple[str, str]) -> dict[str
 
 
 def _spread(row: np.ndarray) -> np.ndarray:
-    """Return how the signals move when the one that `row` reads moves by one and its opposite stays."""
+    """Return the change of the signals when the one that `row` reads moves by one and its opposite does not move."""
     return row / float(row @ row)
 
 
@@ -261,7 +263,7 @@ class Mode(NamedTuple):
     Attributes:
         pole: λ; of a pair the one above the real axis. [1/s]
         scaled: λ L/U; −1 decays to 37 % while the hull moves on by its own length.
-        time_constant: −1/Re λ, infinite for an integrator, negative for what grows. [s]
+        time_constant: −1/Re λ, infinite for an integrator, negative for a growing mode. [s]
         damping: ζ = −Re λ/|λ|; 1 for a real pole that decays, −1 for one that grows, 0 for an integrator.
         period: of the oscillation, infinite without one. [s]
     """
@@ -274,7 +276,7 @@ class Mode(NamedTuple):
 
 
 INTEGRATOR = 1e-6
-"""A pole nearer to zero than this times U/L is an integrator: differences do not know it better."""
+"""A pole nearer to zero than this times U/L is an integrator: differences are not more accurate."""
 
 
 def modes(system: control.StateSpace, steady: Trim) -> list[Mode]:

@@ -22,7 +22,7 @@ from subzero.errors import UserError
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Law:
-    """The control law of a loop: what is fed back, with which gains. Frozen, so that loops can share it.
+    """The control law of a loop: the states it feeds back, and the gains. Frozen, so that loops can share it.
 
     Attributes:
         measured: channels that are fed back: the tracked one alone, or its rate and it.
@@ -36,7 +36,7 @@ class Law:
     largest_error: float
 
     def __post_init__(self) -> None:
-        """Refuse gains that do not fit."""
+        """Raise an error if the gains do not fit."""
         if self.gains.values.shape[1:] != (len(self.measured) + 2,):
             raise UserError(
                 f"Law: gains of shape {self.gains.values.shape[1:]} for {', '.join(self.measured)}."
@@ -45,7 +45,7 @@ class Law:
 
 
 def refuse_unknown(reading: Observation, measured: tuple[str, ...], **given: float) -> None:
-    """Refuse NaN and infinity: the command limits would turn them silently into full deflection.
+    """Raise an error for NaN and infinity: the command limits would turn them silently into full deflection.
 
     Args:
         reading: the measurements.
@@ -131,7 +131,7 @@ class Loop:
         return min(high, max(low, feed_forward + feedback + self.integral))
 
     def _jump(self, reading: Observation, wanted: float, speed: float, rate: float) -> float:
-        """Return what a jump of the set-point takes off the integral, (1 − b) k_y Δ."""
+        """Return the change of the integral at a jump of the set-point, (1 − b) k_y Δ."""
         before = wanted if self._wanted is None else self._wanted + rate * self.sample_time
         self._wanted = wanted
         *_, k, _, b = self.law.gains.at(speed).tolist()

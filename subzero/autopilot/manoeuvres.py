@@ -67,7 +67,7 @@ class Program(ABC):
 
     @abstractmethod
     def after(self, now: Observation, started: Observation) -> Command:
-        """Return the command once the manoeuvre has begun."""
+        """Return the command after the start of the manoeuvre."""
 
     def turned(self, channel: str, now: Observation, started: Observation) -> float:
         """Return how far an angle has changed, to the side of the rudder or planes [rad]; refuse an unknown one."""
@@ -162,13 +162,13 @@ class Manoeuvre:
 
     Attributes:
         meaning: in words.
-        program: what commands it.
+        program: the program that commands it.
         size: by default. [degree; 1]
         unit: of the size.
         duration: of the manoeuvre after the straight run. [s]
-        index: what measures it, from `indices`.
-        channels: what of a run the index takes, in its order, SI and radians.
-        numbers: what else it takes, by name.
+        index: the function that measures it, from `indices`.
+        channels: channels of a run that the index takes, in its order, SI and radians.
+        numbers: further arguments of it, by name.
         takes_size_as: the name of the size among these, if it takes it.
     """
 
@@ -257,7 +257,7 @@ def manoeuvre(
         speed: of the bare hull in the straight run, which the propeller is set for. [m/s]
         tethered: with the cable.
         model: another model than the scenario's.
-        progress: told the fraction that is done.
+        progress: called with the fraction that is done.
 
     Raises:
         UserError: there is no such manoeuvre, a size of nothing or beyond the fins, no steady motion at this speed.

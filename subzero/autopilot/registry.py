@@ -1,4 +1,4 @@
-"""The one table of autopilots, and of what can be fed forward, by name.
+"""The one table of autopilots, and of feed-forward models, by name.
 
 To add one of your own: a small file with a class as `flight.Autopilot` says, and a line here; or hand the object to
 `fly`; or give the path of the file as the name (`from_file`), on the command line too:
@@ -7,7 +7,8 @@ To add one of your own: a small file with a class as `flight.Autopilot` says, an
         return Mine(tuning, sample_time, cable)
 
 The file has to have a function `make`; what it returns has to be as `flight.Autopilot` says. `tuning` holds the gains
-and trims of the vehicle, `cable.wrench(reading, last_command)` tells what the cable does to it, and may be ignored.
+and trims of the vehicle, `cable.wrench(reading, last_command)` returns the cable's wrench on it, and need not be
+used.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from subzero.files.read_file import MOST_OF_A_PROGRAM, read_bytes
 from subzero.model import Model, model_of
 
 Build = Callable[[Tuning, float, CableModel], Autopilot]
-"""What makes an autopilot, from a tuning, a sample time [s] and a cable model."""
+"""The factory of an autopilot, from a tuning, a sample time [s] and a cable model."""
 
 
 def from_file(path: str | Path) -> Build:
@@ -56,7 +57,7 @@ def from_file(path: str | Path) -> Build:
 
 
 def built(path: str | Path, build: Build, tuning: Tuning, sample_time: float, cable: CableModel) -> Autopilot:
-    """Return what the function `make` of a file makes.
+    """Return the autopilot that the function `make` of a file makes.
 
     Raises:
         UserError: it raised an error of its own.
@@ -88,14 +89,14 @@ LONGEST_SAMPLE_S = 60.0
 """A controller that sleeps longer holds nothing. [s]"""
 
 AUTOPILOTS: dict[str, Build] = {"pid": _pid, "lqr": _lqr}
-"""Name → what makes one, from a tuning, a sample time [s] and a cable model."""
+"""Name → factory of an autopilot, from a tuning, a sample time [s] and a cable model."""
 
 FEED_FORWARD: dict[str, Callable[[Tuning, scenarios.Trial, float, Model], CableModel]] = {
     "none": lambda tuning, trial, sample_time, believed: NoCable(),
     "formula": lambda tuning, trial, sample_time, believed: FormulaCable(tuning, believed),
     "model": lambda tuning, trial, sample_time, believed: TwinCable(trial, sample_time, believed),
 }
-"""Name → what makes a cable model, from a tuning, a trial, a sample time [s] and what is believed of the model."""
+"""Name → factory of a cable model, from a tuning, a trial, a sample time [s] and the assumed model."""
 
 
 def make(
@@ -111,11 +112,11 @@ def make(
 
     Args:
         name: one of `AUTOPILOTS`, or the path of a Python file with one (`from_file`).
-        trial: what it will fly.
+        trial: the trial to fly.
         feed_forward: one of `FEED_FORWARD`.
         sample_time: of the controller. [s]
         tuning: gains; those of `tune` on the trial's vehicle by default.
-        believed: what the autopilot believes of vehicle, cable and water; the trial's by default.
+        believed: the autopilot's assumed vehicle, cable and water; the trial's by default.
 
     Raises:
         UserError: there is no such autopilot or feed-forward; a sample time of nothing; with these gains and this

@@ -30,13 +30,13 @@ class Sensor:
     """One sensor of one channel; all in the unit of `Observation`: SI, radians.
 
     Attributes:
-        channel: what it measures, a field of `Observation`.
+        channel: the channel that it measures, a field of `Observation`.
         period: time between samples; 0 samples whenever it is asked. [s]
         noise: standard deviation of each sample, white.
         bias: constant error.
         drift: growth of a random walk: its standard deviation is drift·√t. [unit/√s]
         quantum: samples are whole multiples of this; 0 is exact.
-        delay: until a sample is told. [s]
+        delay: from the sample to its reading. [s]
         drop_out: probability that a sample is lost.
 
     Raises:
@@ -53,7 +53,7 @@ class Sensor:
     drop_out: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be a sensor."""
+        """Raise an error if the fields do not describe a possible sensor."""
         allowed = Observation._fields[1:]
         if not isinstance(self.channel, str) or self.channel not in allowed:
             raise UserError(
@@ -118,7 +118,7 @@ class Sensors:
         self._running = [_Running(sensor, self.seed) for sensor in self.sensors]
 
     def read(self, seen: Observation) -> Observation:
-        """Return what the sensors tell now; NaN for channels that have none. (Clocks are exact.)"""
+        """Return the readings of the sensors now; NaN for channels without a sensor. (Clocks are exact.)"""
         reported = {sensor.sensor.channel: sensor.read(seen) for sensor in self._running}
         return UNKNOWN._replace(time=seen.time, **reported)
 
@@ -158,7 +158,7 @@ class _Running:
             self._next += (behind + 1) * self.sensor.period
 
     def _sample(self, truth: float, passed: float) -> float:
-        """Return what the sensor makes of the truth, `passed` seconds after the sample before."""
+        """Return the reading of the sensor for a true value, `passed` seconds after the sample before."""
         s = self.sensor
         self._walk += s.drift * math.sqrt(passed) * self._rng.standard_normal()
         value = truth + s.bias + self._walk + s.noise * self._rng.standard_normal()

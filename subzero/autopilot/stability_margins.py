@@ -61,7 +61,7 @@ def margins(loop: control.StateSpace, *, delay: float = 0.0) -> Margins:
 
     Args:
         loop: L, from the command to minus the command, such as `Gains.loop`; continuous or sampled.
-        delay: beside it, of computing and sensors. [s]
+        delay: an additional delay, of computing and sensors. [s]
     """
     sampled = loop.dt not in (None, 0)
     w = np.geomspace(1e-3, np.pi / loop.dt if sampled else 1e3, 4000)
@@ -88,7 +88,7 @@ if TYPE_CHECKING:
     import control
 
 MARGINAL = 1e-6
-"""A motion that grows by less than this a sample counts as one that stays, as the depth behind the pitch loop does."""
+"""A motion that grows by less than this per sample counts as constant, as the depth in the pitch loop does."""
 
 
 def loop_margins(tuning: Tuning, loop: str, *, late: float = 0.0, **options: Any) -> Margins:
@@ -138,7 +138,7 @@ def sampled_loop(
 
 
 def check_stable(tuning: Tuning, sample_time: float, estimates: Estimates | None = None) -> None:
-    """Refuse gains with which the sampled bare hull is unstable.
+    """Raise an error for gains with which the sampled bare hull is unstable.
 
     Args:
         tuning: the gains.
@@ -146,7 +146,7 @@ def check_stable(tuning: Tuning, sample_time: float, estimates: Estimates | None
         estimates: a heading by full state feedback instead of the PID.
 
     Raises:
-        UserError: a loop is unstable at one of the speeds: which, and what to change.
+        UserError: a loop is unstable at one of the speeds: which, and the remedy.
     """
     for loop in WEIGHTS:
         for speed, linear in zip(tuning.speeds, tuning.linear, strict=True):

@@ -29,8 +29,8 @@ STEP_AT, DURATION = 15.0, 60.0
 
 @dataclass(frozen=True, kw_only=True)
 class Step:
-    """A line of the table: what is stepped, its channel, by how much (in the unit of the channel), inner per unit, and
-    how the name of an index in that unit ends.
+    """A row of the table of steps: the field that is stepped, its channel, the size of the step (in the unit of the
+    channel), the internal unit per unit of the channel, and the ending of the name of an index in that unit.
     """
 
     field: str
@@ -50,14 +50,14 @@ STEPS = {
 
 @dataclass(frozen=True, kw_only=True)
 class Pilot:
-    """Who flies a step, with what knowledge.
+    """The autopilot that flies a step, and its model of the plant.
 
     Attributes:
         autopilot: one of `AUTOPILOTS`, or the path of a Python file with one.
-        feed_forward: one of `FEED_FORWARD`: what it knows of the cable.
-        tuning: gains; those of `tune` on what is believed by default.
-        believed: what it believes of vehicle, cable and water; the scenario's by default, which is what is true.
-        sensors: what it is told; `Sensors` have a seed.
+        feed_forward: one of `FEED_FORWARD`: the model of the cable that is fed forward.
+        tuning: gains; those of `tune` on the assumed model by default.
+        believed: the assumed vehicle, cable and water; the scenario's by default, which is the true model.
+        sensors: sensors that the autopilot reads; `Sensors` have a seed.
     """
 
     autopilot: str = "pid"
@@ -96,11 +96,11 @@ def step(
     Args:
         name: one of `STEPS`.
         scenario: whose vehicle, cable and start; its commands are not used.
-        pilot: who flies; a PID autopilot that knows nothing of the cable by default.
+        pilot: the autopilot; by default a PID autopilot without a model of the cable.
         size: of the step, in degrees, m or m/s; the table's by default.
         speed: to hold. [m/s]
         tethered: with the cable.
-        progress: told the fraction that is done.
+        progress: called with the fraction that is done.
 
     Raises:
         NoTrimError: the bare hull cannot hold a speed that is asked for; the message says which it can.

@@ -1,6 +1,6 @@
 """The gain schedule of the standard autopilots: gains, trim and fin effectiveness of a vehicle at several speeds.
 
-The design is for the bare hull. The cable is not part of it, so the feedback stays valid when the cable is cut.
+The design is for the bare hull. The cable is not part of it, so the feedback remains valid when the cable is cut.
 `WEIGHTS` are the largest acceptable deviations of each loop (Bryson's rule); give others to `tune`.
 """
 
@@ -137,7 +137,7 @@ def _mixed_planes(steady: Trim) -> np.ndarray:
 
 
 def _against(linear: control.StateSpace, name: str, inverse_mass: np.ndarray) -> np.ndarray:
-    """Return the fin angle per external force and moment (2,) at which the turn rate stays 0 in steady sway (heave).
+    """Return the fin angle per external force and moment (2,) that keeps the turn rate at 0 in steady sway (heave).
 
     A = [a_v  a_vr; a_rv  a_r], b by the fin: with v' = 0 and r = 0, r' = (1, −a_rv/a_v)·(d_r + b_r δ, d_v + b_v δ).
     """

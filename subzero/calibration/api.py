@@ -53,9 +53,9 @@ def calibrate(
         scenario: the trial of every record whose sidecar does not name one.
         free: dotted names of the numbers to estimate, such as "rudder.lift_slope" or "cable.normal_drag_coefficient";
             if empty, the twelve that records usually determine.
-        vehicle: name or file of the vehicle to begin with, in the place of those of the trials.
+        vehicle: name or file of the vehicle to begin with, instead of those of the trials.
         commands: "record" or "scenario", if a record's commands may differ from the scenario's.
-        progress: told the fraction that is done, and what is being done.
+        progress: called with the fraction that is done, and the task in progress.
         quick: the fit and its intervals only, without profiles and advice.
 
     Raises:
@@ -98,7 +98,7 @@ def _with_vehicle(found: Logged, vehicle: str | Path) -> Logged:
 
 
 def _check(logged: Sequence[Logged]) -> None:
-    """Refuse records that no number of one vehicle can be estimated from."""
+    """Raise an error for records that no number of one vehicle can be estimated from."""
     if not logged:
         raise UserError(NO_RECORD)
     first = logged[0]
@@ -118,11 +118,11 @@ def _check(logged: Sequence[Logged]) -> None:
 
 @dataclasses.dataclass(frozen=True)
 class _Work:
-    """A calibration while it is done.
+    """A calibration in progress.
 
     Attributes:
-        progress: told the fraction that is done, and what is being done.
-        seconds: what was done → how long it took. [s]
+        progress: called with the fraction that is done, and the task in progress.
+        seconds: task → how long it took. [s]
     """
 
     progress: Progress
@@ -189,7 +189,7 @@ class PartFile:
     Attributes:
         name: as it was named.
         before: its text; "" if there is no file.
-        ranges: dotted name → what it declares as plausible.
+        ranges: dotted name → the range that the file declares as plausible.
         names: dotted names of the free numbers in it.
     """
 
@@ -199,7 +199,7 @@ class PartFile:
     names: tuple[str, ...]
 
     def text(self, found: Calibration) -> str:
-        """Return its text with what was found; "" if there was none."""
+        """Return its text with the estimates; "" if there were none."""
         if not self.before:
             return ""
         own = {vehicle_file.section_of(name)[1]: found[name] for name in self.names}
@@ -236,7 +236,7 @@ def files_of(given: Logged, names: Sequence[str], vehicle: str | Path | None) ->
 
 
 def source_of(trial: Logged) -> Source:
-    """Return what a calibrated file says of a record: its bytes if it is a file, else its values."""
+    """Return the provenance of a record for a calibrated file: its bytes if it is a file, else its values."""
     path = Path(trial.record.source)
     if path.is_file():
         digest = hashlib.sha256(path.read_bytes())
@@ -256,7 +256,7 @@ def source_of(trial: Logged) -> Source:
 
 
 def _notes(logged: Sequence[Logged], numbers: Sequence[Number], work: Fitted) -> Iterator[str]:
-    """Give what else to know."""
+    """Yield further remarks."""
     for trial in logged:
         yield from trial.notes
     if len(logged) == 1:

@@ -1,4 +1,5 @@
-"""What a calibration is worth: directions that records do not determine, profiles, held-out errors, what to fly next.
+"""Assessment of a calibration: directions that records do not determine, profiles, held-out errors, trials to fly
+next.
 
     Λ = D^½ (M_ff⁻¹ − D⁻¹) D^½,   Λ e = λ e
 
@@ -31,9 +32,9 @@ from subzero.diagnosis.inference import (
 )
 
 UNDETERMINED_ABOVE = 0.5
-"""What is left of the standard deviation beforehand, from which on the records do not determine it. [-]"""
+"""Remaining share of the prior standard deviation from which on the records do not determine a direction. [-]"""
 SMALL_PART = 0.2
-"""Parts of a direction smaller than this share of the largest, in priors, are not told. [-]"""
+"""Parts of a direction smaller than this share of the largest, in priors, are not reported. [-]"""
 AT_BOUND = 1e-9
 
 
@@ -69,7 +70,7 @@ def correlation(M: np.ndarray) -> np.ndarray:
 
 
 def directions(numbers: Sequence[Number], M: np.ndarray) -> tuple[Direction, ...]:
-    """Return what the records do not determine, from the covariance of the free numbers (n, n)."""
+    """Return the directions that the records do not determine, from the covariance of the free numbers (n, n)."""
     prior = np.array([number.prior_sd for number in numbers])
     shares = prior[:, None] * (np.linalg.inv(M) - np.diag(prior**-2)) * prior
     values, vectors = np.linalg.eigh(0.5 * (shares + shares.T))
@@ -198,11 +199,12 @@ def _errors(
 
 
 MOST_WANDER = 2.5
-"""Where what is left wanders by more than so many usual levels, it is a misfit and no noise. [-]"""
+"""Where the remaining residuals wander by more than so many usual levels, they are a misfit and not noise. [-]"""
 
 
 def refused(numbers: Sequence[Number], work: Fitted) -> tuple[str, ...]:
-    """Say in sentences why a fit is no calibration: it leaves what is no noise, or found no minimum within bounds.
+    """Return in sentences why a fit is not a calibration: it leaves more than noise, or found no minimum within
+    bounds.
 
     A wrong minimum has intervals as narrow as the right one; what gives it away is the colour of what it leaves, and a
     number at its bound that makes up for another. Noise is estimated behind the fit, and a misfit would pass for slow
@@ -235,22 +237,22 @@ def refused(numbers: Sequence[Number], work: Fitted) -> tuple[str, ...]:
 
 
 def _is_coarse(noise: Noise) -> bool:
-    """Say whether a channel is rounded so coarsely that what is left is never white: where it hardly moves, the error
-    of the rounding is the same for many samples.
+    """Return whether a channel is rounded so coarsely that its residuals are never white: where it hardly moves, the
+    error of the rounding is the same for many samples.
     """
     return bool(noise.resolution > COARSE * math.sqrt(12.0) * noise.white)
 
 
 COARSE = 0.5
-"""Rounding errors of more than this share of the white noise are told apart from it. [-]"""
+"""Rounding errors of more than this share of the white noise are distinguished from it. [-]"""
 STRANGE_P = 1e-4
 """A channel whose whitened residual is white with less than this probability is no noise. [-]"""
 STRANGE_NOISE = 3.0
-"""Noise of more than so many usual levels is told: it may be what the vehicle cannot do. [-]"""
+"""Noise of more than so many usual levels is reported: it may be an effect that the model does not contain. [-]"""
 
 
 def strange(work: Fitted) -> tuple[str, ...]:
-    """Say in sentences which sensors are many times as noisy as usual."""
+    """Return in sentences which sensors are many times as noisy as usual."""
     found = []
     for record in work.problem.records:
         for name, noise in record.noise.items():
@@ -262,7 +264,7 @@ def strange(work: Fitted) -> tuple[str, ...]:
 
 
 def advice(numbers: Sequence[Number], work: Fitted, progress: Progress) -> tuple[Advice, ...]:
-    """Return the safe trials of the library, by what they would add on the free numbers."""
+    """Return the safe trials of the library, by the information they would add on the free numbers."""
     problem, count = work.problem, len(numbers)
     shared = [k for k, entry in enumerate(problem.entries) if entry.record < 0]
     M = _with_new_start(work.M[np.ix_(shared, shared)])
@@ -298,7 +300,7 @@ def _information(coming: Problem, z: np.ndarray) -> np.ndarray:
 
 
 def _with_new_start(M: np.ndarray) -> np.ndarray:
-    """Return the covariance of what trials share and of the start of a new one."""
+    """Return the covariance of the parameters that trials share and of the start of a new one."""
     start = [parameter.tolerance**2 for effect in START for parameter in effect.parameters]
     whole = np.zeros((M.shape[0] + len(start),) * 2)
     whole[: M.shape[0], : M.shape[0]] = M
@@ -318,5 +320,5 @@ def nuisances(work: Fitted, count: int) -> dict[str, tuple[float, float]]:
 
 
 def at_nominal(problem: Problem) -> Problem:
-    """Return the problem without what was added to its simulations."""
+    """Return the problem without the parts that were added to its simulations."""
     return replace(problem, records=tuple(replace(record, correction={}) for record in problem.records))

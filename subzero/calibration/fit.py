@@ -1,4 +1,4 @@
-"""The most probable numbers, the noise behind them, and the covariance of both together.
+"""The most probable numbers, the noise estimated with them, and the covariance of both together.
 
     M = P⁻¹,  P = D⁻¹ + Jᵀ J;        honest:  M' = P⁻¹ (D⁻¹ + Jᵀ Ω J) P⁻¹,   Ω = cov(r)
 
@@ -39,13 +39,13 @@ from subzero.diagnosis.inference import (
 )
 
 HORIZONS = ((0.3, 0.6, 1.0), (0.1, 0.2, 0.35, 0.6, 1.0))
-"""Shares of the records that are fitted, one behind the other; of the first start, and of the second. [-]"""
+"""Shares of the records that are fitted, one after the other; of the first start, and of the second. [-]"""
 MORE_STARTS, START_SHARE = 4, 0.3
 """Starts with other numbers, up to this share of each, where those did not end in the same minimum. [-]"""
 SAME_MINIMUM = 10.0
 """Fits of two starts whose objectives differ by less ended in the same minimum; others differ by hundreds. [nat]"""
 MAX_CHECKS = 3
-"""How often a fit goes on from what is better at the end of an interval."""
+"""How often a fit continues from a better point found at the end of an interval."""
 SIGMAS_95 = float(ndtri(0.975))
 """Half an interval of 95 % in standard deviations."""
 LEAST_RISE = 0.25
@@ -53,7 +53,7 @@ LEAST_RISE = 0.25
 MAX_PROFILE_STEPS, PROFILE_GAIN = 5, 0.1
 """Steps of the fit of all others with one number held, and the gain that is worth one more. [nat]"""
 MAX_LOWERINGS, FAILED_SHARE = 5, 0.9
-"""Noise is lowered so often; no more where the misfit stays above this share of what it was. [-]"""
+"""Noise is lowered so often; no more where the misfit remains above this share of its former value. [-]"""
 FIRST_MISFIT = 2.0
 """A fit begins with so much noise that it leaves the vehicle so many levels off. [-]"""
 FIRST_STEPS = 10
@@ -61,12 +61,12 @@ FIRST_STEPS = 10
 MAX_STEPS = 25
 """Steps of a fit, at most."""
 SETTLED_GAIN = 0.3
-"""A fit that the linear problem promises less than this has settled. [nat]"""
+"""A fit has settled when the linear problem predicts a gain of less than this. [nat]"""
 LEAST_SHARE, FRESH_SHARE = 0.05, 0.5
-"""A step that gains less than the first share of what was promised is not taken; behind one that gains less than the
-second, sensitivities are made again. [-]"""
+"""A step that gains less than the first share of the predicted gain is not taken; after one that gains less than the
+second, sensitivities are computed again. [-]"""
 FIRST_DAMPING, LEAST_DAMPING = 1.0, 0.1
-"""Damping of a step that failed, in inverse prior variances, and that which is none any more. [-]"""
+"""Damping of a step that failed, in inverse prior variances, and the damping that counts as zero. [-]"""
 OWN_WITHIN = 0.3
 """Sensitivities will do for a first fit if they were made so close to it, in tolerances."""
 MAX_NOISE_ROUNDS = 2
@@ -78,7 +78,7 @@ class Fitted:
     """The fit of a calibration.
 
     Attributes:
-        problem: with the noise that was estimated behind the fit.
+        problem: with the noise that was estimated with the fit.
         fit: the most probable deviations.
         M: their covariance (k, k), inflated.
         settled: no step would move a calibrated number (`is_settled`), nor did one from the ends of an interval.
@@ -93,13 +93,13 @@ class Fitted:
 
 
 def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fitted:
-    """Return the most probable deviations, with the noise behind them.
+    """Return the most probable deviations, with the noise they were estimated with.
 
     Args:
-        problem: records, and what is free.
+        problem: records, and the free parameters.
         free: so many entries, the first ones, are the numbers that are calibrated.
         D: prior variances of all entries (k,).
-        progress: told the fraction that is done, and what is being done.
+        progress: called with the fraction that is done, and the task in progress.
     """
     first, spread, repeated = _first(problem, free, D, progress)
     progress(0.5, "fit with usual noise")
@@ -130,10 +130,11 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
 
 
 def is_settled(problem: Problem, fit: Fit, M: np.ndarray, free: int) -> bool:
-    """Whether the whole step that the linear problem asks for moves no calibrated number out of its interval.
+    """Return whether the full step of the linear problem moves no calibrated number out of its interval.
 
-    By less than √(2 `SETTLED_GAIN`) of its standard deviation, which is worth that gain. The damped steps of the fit
-    get as short as one likes, so what they promise says nothing; what a step does to sensors and starts is no matter.
+    It must be less than √(2 `SETTLED_GAIN`) standard deviations, which corresponds to that gain. The damped steps of
+    the fit can be arbitrarily short, so their predicted gain shows nothing; changes of sensors and starts are not
+    considered.
     """
     step = bounded_step(fit.J, fit.r, fit.z, fit.D, *bounds(problem))
     sd = np.sqrt(np.diag(M))

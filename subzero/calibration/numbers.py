@@ -1,8 +1,8 @@
-"""The numbers that are free in a calibration, with their priors; and what else may be a little off.
+"""The numbers that are free in a calibration, with their priors; and other numbers that may deviate a little.
 
 A number of the vehicle's (or the cable's) file becomes an effect, in the terms of a diagnosis: a deviation z of the
 number in its own unit, with a prior N(0, σ²), σ the width of the range of the file and no less than `LEAST_PRIOR_SHARE`
-of the number. Everything of the catalogue that moves none of them stays free within its tolerance.
+of the number. All effects of the catalogue that move none of them remain free within their tolerances.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ USUAL = (
 is none of them: masses and forces that all scale together move nothing, and a vehicle can be weighed."""
 
 LEAST_PRIOR_SHARE = 0.4
-"""A prior is no narrower than this share of the number: ranges are what somebody thought plausible. [-]"""
+"""A prior is no narrower than this share of the number, since ranges are estimates of an author. [-]"""
 STEP_SHARE = 0.03
 """A number has moved if it has by this share of itself, or of its range if it is 0: the unit of fits and steps. [-]"""
 LOWEST_SHARE, HIGHEST_SHARE = -0.9, 5.0
@@ -58,7 +58,7 @@ class Number:
     Attributes:
         name: dotted.
         unit: of its file.
-        nominal: what the file has.
+        nominal: the number in the file.
         prior_sd: standard deviation of its deviation, beforehand.
         tolerance: how far a healthy vehicle may be from a number that is known.
         step: a deviation that is noticeable.
@@ -162,7 +162,9 @@ def _number(problem: Problem, name: str, declared: tuple[float, float] | None) -
 
 
 def _tolerance(problem: Problem, name: str) -> float:
-    """Return by how much a number may be off in a diagnosis: what is declared, or what causes that move it may."""
+    """Return by how much a number may deviate in a diagnosis: its declared tolerance, or that of causes that move
+    it.
+    """
     setting = problem.records[0].setting
     if name in setting.trial.tolerances:
         return float(setting.trial.tolerances[name])
@@ -179,7 +181,7 @@ def _moved(effect: Effect, setting: Setting) -> Setting:
 
 
 def _bounds(nominal: float, low: float, high: float) -> tuple[float, float]:
-    """Return the least and the greatest possible deviation: what has a sign keeps it."""
+    """Return the least and the greatest possible deviation: a number with a sign keeps it."""
     if nominal != 0.0:
         ends = (LOWEST_SHARE * nominal, HIGHEST_SHARE * nominal)
         return min(ends), max(ends)
@@ -190,7 +192,7 @@ def _bounds(nominal: float, low: float, high: float) -> tuple[float, float]:
 def with_free_numbers(problem: Problem, numbers: Sequence[Number]) -> tuple[Problem, np.ndarray]:
     """Return the problem in which numbers are free, and the prior variances of all its entries (k,).
 
-    Beside the numbers stay those causes of the catalogue that move none of them, within tolerance.
+    In addition to the numbers, those causes of the catalogue that move none of them remain free, within tolerance.
     """
     setting = problem.records[0].setting
     effects = list(dict.fromkeys(entry.effect for entry in problem.entries if entry.record < 0))
@@ -210,7 +212,7 @@ def prior_variances(entries: Sequence[Entry], numbers: Sequence[Number]) -> np.n
 
 
 def _touches(effect: Effect, setting: Setting, names: Sequence[str]) -> bool:
-    """Say whether an effect moves one of some numbers."""
+    """Return whether an effect moves one of some numbers."""
     before, after = (
         [number_of(name, number) for name in names] for number in (setting, _moved(effect, setting))
     )

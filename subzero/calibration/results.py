@@ -1,4 +1,6 @@
-"""What a calibration says, as values: estimates, what is not determined, held-out errors, what to fly."""
+"""The result of a calibration, as values: estimates, undetermined directions, held-out errors, advice on trials to
+fly.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,7 @@ REMEDY = (
     "Hold records and trials together first: units, signs, commands, clock, cable. Then free what may be far off "
     "(--free), begin with a vehicle that is nearer (--vehicle), or leave the worst record out."
 )
-"""What to do where nothing comes near."""
+"""The advice if no numbers come near the records."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,14 +26,14 @@ class Estimate:
     Attributes:
         name: dotted, such as "vehicle.axial_drag.drag_coefficient".
         unit: of all values, as in the file.
-        before: what the file has.
+        before: the number in the file.
         value: the most probable.
         sd: its standard deviation; the interval of 95 % is 1.96 times as far to either side, within bounds.
         low, high: the interval of 95 %.
         prior_sd: standard deviation beforehand, from the range of the file.
         tolerance: how far a healthy vehicle may be from the estimate: its uncertainty, and what was allowed before.
-        is_determined: the records, and not what was believed beforehand, say what it is.
-        is_at_bound: it would go beyond what is possible.
+        is_determined: the records, and not the prior alone, determine the value.
+        is_at_bound: the estimate is at a bound of the possible values.
     """
 
     name: str
@@ -48,7 +50,7 @@ class Estimate:
 
     @property
     def change(self) -> float:
-        """Change as a share of what the file has; NaN where that has nothing."""
+        """Change as a share of the number in the file; NaN where that is 0."""
         return (self.value - self.before) / abs(self.before) if self.before else float("nan")
 
 
@@ -57,8 +59,8 @@ class Direction:
     """A common change of some numbers that the records hardly show.
 
     Attributes:
-        parts: name → change of one standard deviation of what is left, in the number's unit; the largest ones.
-        left: share of the standard deviation beforehand that is left.
+        parts: name → change of one remaining standard deviation, in the number's unit; the largest ones.
+        left: remaining share of the prior standard deviation.
         sentence: in words.
     """
 
@@ -108,7 +110,7 @@ class Advice:
 
     Attributes:
         name, sentence: as in the library of trials.
-        information: what it would add on the numbers that are free. [nat]
+        information: the information it would add on the free numbers. [nat]
         sharper: name → factor by which its standard deviation would shrink, the largest first.
         commands: rows of time [s], propeller [rev/s], rudder, port and starboard stern-plane [rad].
     """
@@ -139,20 +141,20 @@ class Calibration:
     Attributes:
         estimates: of the numbers that were free.
         correlation: of the estimates (n, n).
-        directions: what these records do not determine, the least determined first.
+        directions: the directions that these records do not determine, the least determined first.
         profiles: name → profile; empty if they were not made.
         held_out: record → channel → errors; of one record alone, of blocks of it.
-        how: what was held out: "other trials" or "blocks of the same trial".
-        advice: what to fly next, the best first.
+        how: the samples that were held out: "other trials" or "blocks of the same trial".
+        advice: the trials to fly next, the best first.
         nuisances: parameter → (mean, standard deviation) in tolerances, of sensors, clock, current, cable and start.
         strange: sentences on what the calibrated vehicle leaves that is no noise; empty if all is.
         refused: sentences on why the fit is no calibration, the verdict "nothing_near"; empty if it is one.
-        curves: record → what was measured, and what the vehicle does before and after.
-        records: what it was made of.
+        curves: record → the measurements, and the simulation before and after.
+        records: the records it was made of.
         files: name → text of the calibrated vehicle (and cable); empty where nothing came near.
-        notes: what else to know.
+        notes: further remarks.
         converged: the fit found a minimum.
-        seconds: what was done → how long it took. [s]
+        seconds: task → how long it took. [s]
     """
 
     estimates: tuple[Estimate, ...]
@@ -192,7 +194,7 @@ class Calibration:
 
     @property
     def verdict(self) -> str:
-        """What was found: "calibrated", or "nothing_near" where no numbers leave noise."""
+        """The verdict: "calibrated", or "nothing_near" where no numbers leave noise."""
         return NOTHING_NEAR if self.refused else CALIBRATED
 
     @property

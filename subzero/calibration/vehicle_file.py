@@ -1,6 +1,6 @@
 """The calibrated vehicle (or cable) as a file that every command takes: the file it was, with the numbers estimated.
 
-Of each number `value`, `range` (the interval of 95 %), `tolerance` and `source` are new; all else stays as it was
+Of each number `value`, `range` (the interval of 95 %), `tolerance` and `source` are new; all else is kept as it was
 written, and a section [provenance] says which records made it, when, and with which version. A tolerance is what a
 diagnosis allows a healthy vehicle to be off: the uncertainty of the estimate on top of what was allowed before,
 
@@ -34,7 +34,7 @@ def text_of(before: str, estimates: Mapping[str, Estimate], provenance: Mapping[
 
     Args:
         before: the text of the file that it was.
-        estimates: dotted key of the file → what was estimated.
+        estimates: dotted key of the file → its estimate.
         provenance: key → text, or list of texts.
 
     Raises:
@@ -56,7 +56,7 @@ def text_of(before: str, estimates: Mapping[str, Estimate], provenance: Mapping[
 
 
 def _number_line(line: str, estimate: Estimate) -> str:
-    """Return the line of a number with what was estimated in it."""
+    """Return the line of a number with its estimate."""
     leaf = next(iter(tomllib.loads(line).values()))
     key = line.partition("=")[0].rstrip()
     said = leaf if isinstance(leaf, Mapping) else {"unit": estimate.unit}
@@ -95,7 +95,9 @@ def _rounded(value: float) -> float:
 
 
 def _check(text: str, estimates: Mapping[str, Estimate]) -> None:
-    """Refuse a text that does not hold what it should: the file was not written one number a line."""
+    """Raise an error for a text that does not hold the expected numbers: the file was not written one number a
+    line.
+    """
     held = dict(leaves(tomllib.loads(text)))
     wrong = [
         key
@@ -110,7 +112,7 @@ def _check(text: str, estimates: Mapping[str, Estimate]) -> None:
 
 
 def provenance(records: Sequence[Source], base: str, when: str, version: str, held: str) -> dict[str, Any]:
-    """Return what a calibrated file says of where it comes from.
+    """Return the provenance section of a calibrated file.
 
     Args:
         records: that it was made of.

@@ -1,4 +1,4 @@
-"""The command line: one module a group of commands, and what they print and write.
+"""The command line: one module per group of commands, and the modules that print and write their results.
 
 app                 `main`; simulate, compare, plot, explore
 trials              list, show, new

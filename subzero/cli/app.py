@@ -62,21 +62,21 @@ class Outputs:
     animate: Literal["gif", "mp4"] | None = None
 
     def check(self) -> None:
-        """Refuse what cannot be made, before anything is simulated."""
+        """Raise an error for outputs that cannot be made, before anything is simulated."""
         from subzero.cli.write_results import check_pictures
 
         _refuse_no_export(self.export)
         check_pictures(self.width, self.animate)
 
     def kinds(self) -> dict[str, Any]:
-        """Return what `subzero.cli.write_results.write_all` is to make."""
+        """Return the outputs that `subzero.cli.write_results.write_all` makes."""
         return {"width": self.width, "kind": self.figures, "exports": self.export}
 
 
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Inputs:
-    """What is simulated besides the scenario.
+    """Inputs of the simulation besides the scenario.
 
     Attributes:
         with_: extended model that a diagnosis has written (extended.toml).
@@ -109,7 +109,7 @@ class Inputs:
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Kept:
-    """What is kept of it, and where.
+    """Results to keep, and where.
 
     Attributes:
         out: folder for the files; by default one named after the scenario, here.
@@ -203,11 +203,11 @@ def simulate(
     Args:
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         untethered: leave the cable away.
-        inputs: what is simulated besides the scenario.
-        kept: what is kept of it, and where.
+        inputs: inputs of the simulation besides the scenario.
+        kept: results to keep, and where.
         check: run it once more with half the steps and half the segment length, and say what changes.
         outputs: which files are made, and how.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.cli import write_results
     from subzero.results.netcdf_csv import open_output_folder
@@ -250,12 +250,12 @@ def compare(
 
     Args:
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
-        measured: CSV file of measured channels, to set beside both runs.
-        inputs: what is simulated besides the scenario.
-        kept: what is kept of it, and where.
+        measured: CSV file of measured channels, to compare with both runs.
+        inputs: inputs of the simulation besides the scenario.
+        kept: results to keep, and where.
         check: run both once more with half the steps and half the segment length, and say what changes.
         outputs: which files are made, and how.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.cli import write_results
     from subzero.records.record import read_record
@@ -302,7 +302,7 @@ def plot(
         what: tension, shape3d, motion, forces, attitude, cable; or channels, such as heading. Without it, all six.
         out: folder for the figures; by default the folder of the run.
         format: of the files.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.files.atomic_output import open_output_folder
 
@@ -334,7 +334,7 @@ def explore(
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         port: of the page's address, http://127.0.0.1:PORT; 0 is any that is free.
         no_browser: say the address, and open no browser.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.cli.interrupts import set_exit_message
     from subzero.explore import page as explore_page
@@ -395,7 +395,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 @contextmanager
 def _aloud(output_mode: OutputMode) -> Iterator[None]:
-    """Let a command speak as it was asked to; with --verbose, say what runs, and in the end how long it took."""
+    """Set the output mode of a command; with --verbose, report the versions, and in the end how long it took."""
     set_output_mode(output_mode)
     began = perf_counter()
     if output_mode.verbose:
@@ -411,7 +411,7 @@ def _aloud(output_mode: OutputMode) -> Iterator[None]:
 
 
 def _effort() -> str:
-    """Return what was compiled by this command and where it is kept, as far as it has needed any machine code."""
+    """Return the functions compiled by this command and their folder, as far as it has needed any machine code."""
     if "subzero.jit.machine_code" not in sys.modules:
         return ""
     from subzero.jit.machine_code import base_folder, compiled_functions
@@ -420,7 +420,7 @@ def _effort() -> str:
 
 
 def _note_command(words: Sequence[str]) -> None:
-    """Keep the line that is carried out, for the pages that tell how to do it again; where it writes to is no part."""
+    """Keep the command line, for the pages that state how to repeat it; the output folder is not part of it."""
     kept = [
         word
         for before, word in zip(["", *words], words, strict=False)
@@ -430,7 +430,7 @@ def _note_command(words: Sequence[str]) -> None:
 
 
 def _never_choke(*streams: Any) -> None:
-    """Let a terminal that lacks a letter show ``?`` instead."""
+    """Show ``?`` instead of letters that the terminal lacks."""
     for stream in streams:
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
@@ -443,7 +443,7 @@ def _refuse(message: str) -> int:
 
 
 def _in_words(error: cyclopts.CycloptsError) -> str:
-    """Say what is wrong with the words of a command."""
+    """Return the error in the words of a command, as a sentence."""
     if isinstance(error, cyclopts.UnusedCliTokensError):
         return f"Unexpected argument: {' '.join(error.unused_tokens or [])}."
     if isinstance(error, cyclopts.MissingArgumentError) and error.argument and error.command_chain:
@@ -454,7 +454,9 @@ def _in_words(error: cyclopts.CycloptsError) -> str:
 
 
 def _unknown_option(error: cyclopts.UnknownOptionError) -> str:
-    """Say which option is most like one that is unknown, by their letters: all options have the dashes in common."""
+    """Return the option that is most like one that is unknown, by their letters: all options have the dashes in
+    common.
+    """
     word = (error.token.keyword or error.token.value).split("=")[0]
     options = {name.lstrip("-"): name for argument in error.argument_collection for name in argument.names}
     close = nearest(word.lstrip("-"), options, likeness=OPTION_LIKENESS)
@@ -462,7 +464,7 @@ def _unknown_option(error: cyclopts.UnknownOptionError) -> str:
 
 
 def _missing(command: str, argument: cyclopts.Argument) -> str:
-    """Say what a command needs, and how it is called."""
+    """Return the arguments that a command needs, and how it is called."""
     if not argument.required:
         return f"{argument.name} needs a value."
     return (
@@ -471,7 +473,7 @@ def _missing(command: str, argument: cyclopts.Argument) -> str:
 
 
 def _refuse_no_export(kinds: Sequence[str]) -> None:
-    """Refuse a kind of file that nothing here writes, before the run."""
+    """Raise an error for a kind of file that nothing here writes, before the run."""
     if kinds:
         from subzero.results.export import writer_of
 
@@ -480,7 +482,7 @@ def _refuse_no_export(kinds: Sequence[str]) -> None:
 
 
 def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Runs:
-    """Return runs that know how much they change with half the steps."""
+    """Return runs with their change at half the steps."""
     from subzero.simulation.comparison import refine
 
     marked = {}
@@ -491,7 +493,7 @@ def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Ru
 
 
 def _progress(trial: scenarios.Trial, words: str = "") -> ProgressBar:
-    """Return a progress bar that says what costs in this trial where it stands still."""
+    """Return a progress bar that reports the cost of this trial where it stands still."""
     from subzero.cli.progress import costs_of, progress_bar
 
     return progress_bar(words or f"Simulating {trial.name}", lambda: costs_of(trial))

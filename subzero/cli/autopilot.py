@@ -40,7 +40,7 @@ STEP_COMMANDS = {
     "depth_step": ("depth", "stern_plane_port_command"),
     "speed_step": ("heading", "propeller_command"),
 }
-"""What the figure shows: the answer of the vehicle and the command."""
+"""Channels in the figure: the response of the vehicle and the command."""
 
 
 @Parameter(name="*")
@@ -61,7 +61,7 @@ class PilotOptions:
     seed: int = 0
 
     def of(self, label: str) -> Pilot:
-        """Return who flies with the cable or without it."""
+        """Return the autopilot that flies with the cable or without it."""
         from subzero.autopilot.sensors import ESTIMATED, PERFECT, Sensors
         from subzero.autopilot.steps import Pilot
 
@@ -94,7 +94,7 @@ def manoeuvre(
         planes: size of a manoeuvre with the stern-planes, in degrees.
         speed: of the bare hull before it, in m/s.
         out: folder for the files; by default one named after the manoeuvre, here.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     trial = scenarios.load(scenario)  # a mistake in it answers at once
     from subzero.autopilot.manoeuvres import MANOEUVRES
@@ -120,7 +120,7 @@ def fly_step(
     out: Path | None = None,
     output_mode: StrictOutputMode = NOT_STRICT,
 ) -> int:
-    """Let an autopilot follow a step, with the cable and without, and measure it.
+    """Fly a step with an autopilot, with the cable and without, and measure it.
 
     Args:
         name: heading_step, depth_step or speed_step.
@@ -129,7 +129,7 @@ def fly_step(
         size: of the step, in degrees, m or m/s.
         speed: to hold, in m/s.
         out: folder for the files; by default one named after the step, here.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     trial = scenarios.load(scenario)  # a mistake in it answers at once
     from subzero.autopilot.steps import step as run
@@ -176,7 +176,7 @@ def _deliver(
     shown: tuple[str, str],
     output_mode: StrictOutputMode,
 ) -> int:
-    """Fly with the cable and without, write and tell; return the exit code."""
+    """Fly with the cable and without, write the results and print a summary; return the exit code."""
     from subzero.autopilot import AutopilotWarning
     from subzero.cli import write_flights
     from subzero.cli.progress import costs_of, progress_bar
@@ -185,7 +185,7 @@ def _deliver(
 
     with open_output_folder(folder) as output_folder:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", AutopilotWarning)  # the outcome tells it, below
+            warnings.simplefilter("ignore", AutopilotWarning)  # the outcome reports it, below
             measured: Measured = {}
             for label in RUNS:
                 with progress_bar(f"Flying {trial.name}, {label}", lambda: costs_of(trial)) as progress:

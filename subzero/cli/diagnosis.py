@@ -28,13 +28,13 @@ if TYPE_CHECKING:
 
 FINE, NO_CALIBRATION = 0, 3
 LAST_WORDS_S = 60.0
-"""An interrupted diagnosis has so long to tell and write what it has. [s]"""
+"""Time that an interrupted diagnosis has to print and write its partial results. [s]"""
 
 COSTS = (
     "What costs are the simulations of the trial. Try --screen, a shorter record, or a longer cable_step_s and "
     "segment_length_m in the scenario."
 )
-"""What is told where a diagnosis stands still."""
+"""Advice that is printed when a diagnosis stands still."""
 
 Flag = Annotated[bool, Parameter(negative=())]
 With = Annotated[Path | None, Parameter(name="--with")]
@@ -66,7 +66,7 @@ FULL_SEARCH = Search()
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class Estimation:
-    """What is estimated.
+    """Settings of the estimation.
 
     Attributes:
         free: numbers to estimate, such as rudder.lift_slope; by default the twelve that records usually determine.
@@ -91,7 +91,7 @@ def diagnose(
     search: Search = FULL_SEARCH,
     output_mode: OutputMode = PLAIN,
 ) -> int:
-    """Say what the simulation gets wrong in measured records, name the cause, extend the model and measure the gain.
+    """Find the errors of a simulation in measured records, name the cause, extend the model and measure the gain.
 
     Args:
         files: the scenario that was flown, a name (see "subzero list") or a TOML file; a record's sidecar may name it
@@ -101,7 +101,7 @@ def diagnose(
         effects: Python file with causes of your own (EFFECTS = [...]), besides the catalogue.
         commands: whose commands hold if the record and the scenario differ.
         search: how it is searched.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.results.netcdf_csv import open_output_folder
 
@@ -141,12 +141,13 @@ def calibrate(
 
     Args:
         records: CSV files of one vehicle, or folders of them; several manoeuvres say more than one.
-        scenario: what was flown: a name (see "subzero list") or a path; a record's sidecar may name another.
+        scenario: the scenario that was flown: a name (see "subzero list") or a path; a record's sidecar may name
+            another.
         vehicle: name or file of the vehicle to begin with, instead of the scenario's.
-        out: file of the calibrated vehicle; figures and a JSON file go beside it.
+        out: file of the calibrated vehicle; figures and a JSON file are written next to it.
         commands: whose commands hold if the record and the scenario differ.
-        estimation: what is estimated.
-        output_mode: how the command speaks.
+        estimation: settings of the estimation.
+        output_mode: the form of the output.
     """
     from subzero.calibration.numbers import full_name
     from subzero.cli.write_calibration import files_of, print_calibration, write_all
@@ -175,14 +176,14 @@ def challenge(
     reveal: Path | None = None,
     output_mode: OutputMode = PLAIN,
 ) -> int:
-    """Hide an effect in a record, to find it with "subzero diagnose"; --reveal tells afterwards what it was.
+    """Hide an effect in a record, to find it with "subzero diagnose"; --reveal shows it afterwards.
 
     Args:
-        scenario: what is flown: a name (see "subzero list") or a path.
+        scenario: the scenario to fly: a name (see "subzero list") or a path.
         seed: draws the effect, its size, and every number within its tolerance.
         out: folder for the record.
-        reveal: folder of a challenge, to be told what is hidden in it.
-        output_mode: how the command speaks.
+        reveal: folder of a challenge, to show the effect hidden in it.
+        output_mode: the form of the output.
     """
     if reveal is not None:
         from subzero.synthetic.sealed_answer import reveal as reported
@@ -212,10 +213,10 @@ def add_to(app: cyclopts.App) -> None:
 
 
 def _sorted(files: list[Path], scenario: str | None) -> tuple[str | None, list[Path]]:
-    """Return the scenario among what was named, and the records.
+    """Return the scenario among the named files, and the records.
 
-    A TOML file is a scenario, and so is the name of a shipped one beside a record, even if a folder here has that name:
-    `subzero compare fig6` makes one. With --scenario, or alone, such a folder is one of records.
+    A TOML file is a scenario, and so is the name of a shipped one together with a record, even if a folder here has
+    that name: `subzero compare fig6` makes one. With --scenario, or alone, such a folder is one of records.
     """
     named = [file for file in files if file.suffix == ".toml"]
     if scenario is None and not named:
@@ -236,7 +237,7 @@ def _sorted(files: list[Path], scenario: str | None) -> tuple[str | None, list[P
 def extended_run(
     trial: scenarios.Trial, path: Path | None, own: Path | None
 ) -> tuple[scenarios.Trial, dict[str, Any]]:
-    """Return a trial and what to run it with, as an extended model says (``--with``), and the user's own causes."""
+    """Return a trial and its simulation, as an extended model says (``--with``), and the user's own causes."""
     if path is None:
         if own is not None:
             raise UserError(
@@ -281,7 +282,7 @@ def _read(paths: list[Path], scenario: str | None, commands: str | None) -> list
 
 
 def simulated(setting: Setting) -> xr.Dataset:
-    """Return what the vehicle does in a setting, with the steps that the diagnosis took."""
+    """Return the run of the vehicle in a setting, with the steps that the diagnosis took."""
     from subzero.simulation.run import simulate
 
     every = setting.trial.every or setting.trial.cable_step  # all of them, however long the record is
@@ -290,7 +291,7 @@ def simulated(setting: Setting) -> xr.Dataset:
 
 
 def _ask(logged: list[Logged], own: tuple[Effect, ...], search: Search, output_mode: OutputMode) -> Verdict:
-    """Diagnose under a progress bar; an interrupt ends it with what it has, if it has anything."""
+    """Diagnose under a progress bar; an interrupt ends it with its partial results, if it has any."""
     from subzero.cli.write_diagnosis import print_plan
     from subzero.diagnosis.api import diagnose_trials
 

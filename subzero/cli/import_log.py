@@ -45,7 +45,7 @@ def import_(
         map_out: write the map to this file, and no record: to edit it, and give it again with --map.
         merge: the logs are of one trial: align their clocks by the channels that they share, and make one record.
         trial: write a trial, too, that begins where the record begins, lasts as long, and has its commands.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.logs.align import merged
     from subzero.logs.api import import_log, undecided
@@ -119,7 +119,7 @@ def _targets(logs: list[Path], out: Path, map_out: Path | None, merge: bool) -> 
 def _written(
     found: list[Imported], targets: list[Path], folder: Path, map_out: Path | None
 ) -> dict[str, Any]:
-    """Write all records with their maps, or the map that was asked for, and return what was written."""
+    """Write all records with their maps, or the requested map, and return the files written."""
     from subzero.files.atomic_output import open_output_folder
     from subzero.files.read_file import MEGABYTE, MOST_OF_A_CSV
     from subzero.logs.api import to_csv
@@ -142,12 +142,12 @@ def _written(
                 why = f"its record has {len(text) // MEGABYTE} MB, more than is read"
                 raise refusal(record.source, why, "Name fewer columns in a map, or split the log.")
             (output.path / name).write_text(text, encoding="utf-8")
-            read_record(output.path / name)  # what is written can be read
+            read_record(output.path / name)  # check that the written file can be read
     return output.files()
 
 
 def _print(found: Imported) -> None:
-    """Print a line for each column, and what was done."""
+    """Print a line for each column, and the notes."""
     rows = [HEADINGS, *found.table()]
     widths = [max(len(printable(row[at])) for row in rows) for at in range(4)]
     print(f"{found.source}:")
@@ -159,7 +159,7 @@ def _print(found: Imported) -> None:
 
 
 def _as_json(found: Imported) -> dict[str, Any]:
-    """Return what was found, as plain values."""
+    """Return the findings, as plain values."""
     rows = [dict(zip(HEADINGS, row, strict=True)) for row in found.table()]
     notes = list(found.record.notes) if found.record else []
     return {"log": found.source, "columns": rows, "notes": notes, "questions": found.mapping.questions}

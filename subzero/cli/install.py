@@ -41,7 +41,7 @@ WARM_S = 1.0
 
 
 class Check(NamedTuple):
-    """A result held to something exact: what, how far it is off, how far it may be, relatively."""
+    """A result compared with an exact one: its name, its error, the error allowed, relatively."""
 
     name: str
     error: float
@@ -54,13 +54,14 @@ class Check(NamedTuple):
 
 
 def doctor(*, output_mode: OutputMode = PLAIN) -> int:
-    """Say what is installed, where machine code is kept, and whether this machine computes what is known exactly.
+    """Report the installed versions, the folder of machine code, and whether this machine reproduces known exact
+    numbers.
 
     Three self-checks take some ten seconds: the straight pull of equation (37), a hanging chain, and the energy balance
     of a run. If one is off, the exit code is 3.
 
     Args:
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from subzero.cli.progress import progress_bar
 
@@ -85,7 +86,7 @@ def warm(*, output_mode: OutputMode = PLAIN) -> int:
     """Compile what a comparison such as "subzero compare fig6" uses, once, so that later commands start at once.
 
     Args:
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     import warnings
 
@@ -121,7 +122,8 @@ def add_to(app: cyclopts.App) -> None:
     """Add the commands to the command line."""
 
     def completion(shell: Shell, /) -> int:
-        """Print what makes a shell complete commands and options; put it where your shell looks for completions.
+        """Print the script that makes a shell complete commands and options; put it where your shell looks for
+        completions.
 
         Args:
             shell: bash, zsh or fish.
@@ -143,7 +145,7 @@ def _version(name: str) -> str:
 
 
 def _extras() -> Iterator[tuple[str, list[str]]]:
-    """Return each extra of ours that is not installed whole, and what it lacks."""
+    """Return each extra of ours that is not installed whole, and the packages that it lacks."""
     import re
     from importlib.metadata import requires
 
@@ -232,7 +234,7 @@ def _off(found: np.ndarray, exact: np.ndarray) -> float:
 
 
 def _print(about: dict[str, Any], checks: list[Check]) -> None:
-    """Print what was found."""
+    """Print the findings."""
     from rich.console import Console
     from rich.markup import escape
     from rich.table import Table

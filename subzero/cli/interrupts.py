@@ -1,4 +1,4 @@
-"""What a signal does to a command: it ends with exit code 130, soon, whatever it is doing.
+"""The effect of a signal on a command: it ends with exit code 130, soon, whatever it is doing.
 
 Ctrl-C, SIGTERM or a closed terminal raises `KeyboardInterrupt` in the main thread, so that files are put right and the
 command says what it left. Compiled code may not return to Python for a while, and a full pipe never: so a thread, which
@@ -36,7 +36,7 @@ _exit_message: list[Callable[[], str]] = []
 
 
 def watch() -> None:
-    """Let signals end this process; a signal that is ignored (``nohup``) stays ignored."""
+    """Let signals end this process; a signal that is ignored (``nohup``) remains ignored."""
     woken, waker = socket.socketpair()
     waker.setblocking(False)
     signal.set_wakeup_fd(waker.fileno(), warn_on_full_buffer=False)
@@ -48,7 +48,7 @@ def watch() -> None:
 
 @contextmanager
 def patience(seconds: float) -> Iterator[None]:
-    """Give a command so long after a signal to write what it has [s]; a second signal ends it at once."""
+    """Set the time that a command has after a signal to write its results [s]; a second signal ends it at once."""
     before, _patience[0] = _patience[0], seconds
     try:
         yield
@@ -68,7 +68,7 @@ def leave(code: int) -> Never:
 
 
 def reset() -> None:
-    """Forget what a former command of this process set."""
+    """Clear the messages that a former command of this process set."""
     _exit_message.clear()
     _interrupted.clear()
     if _last_words.locked():
@@ -81,12 +81,12 @@ def was_interrupted() -> bool:
 
 
 def set_exit_message(message: Callable[[], str]) -> None:
-    """Let an interrupted command say what it leaves, if that is more than the files of its end."""
+    """Set the message of an interrupted command, for one that leaves more than the files of its end."""
     _exit_message[:] = [message]
 
 
 def print_interrupted(words: str = "") -> None:
-    """Say the last words of an interrupted command, once: by default what became of its files."""
+    """Print the last words of an interrupted command, once: by default the state of its files."""
     if _last_words.acquire(blocking=False):
         with suppress(OSError, ValueError):  # nothing reads standard error any more
             print(words or f"Interrupted; {_state()}.", file=sys.stderr, flush=True)
@@ -100,7 +100,7 @@ def _state() -> str:
 
 
 def _interrupt(number: int, frame: FrameType | None) -> Never:
-    """Raise what Ctrl-C raises."""
+    """Raise the exception that Ctrl-C raises."""
     _interrupted.set()
     raise KeyboardInterrupt
 
@@ -123,7 +123,7 @@ def _end_late(woken: socket.socket, waker: socket.socket) -> None:
 
 
 def _say_in_time(say: Callable[[], None]) -> None:
-    """Say something in a thread that is left behind if nothing reads it."""
+    """Print something in a thread that is abandoned if nothing reads it."""
     saying = threading.Thread(target=say, daemon=True)
     saying.start()
     saying.join(LAST_WORDS_S)

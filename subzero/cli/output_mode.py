@@ -21,11 +21,11 @@ COMMAND: ContextVar[str] = ContextVar("COMMAND", default="")
 @Parameter(name="*")
 @dataclass(frozen=True, kw_only=True)
 class OutputMode:
-    """How the command speaks.
+    """The form of a command's output.
 
     Attributes:
         as_json: print the result as one JSON object, and nothing else, on standard output.
-        quiet: print no table and no progress; errors and the exit code stay.
+        quiet: print no table and no progress; errors and the exit code remain.
         verbose: print how far to trust the cable too; say on standard error which versions run, where machine code is
             kept, and how long it took.
     """
@@ -36,7 +36,7 @@ class OutputMode:
 
     @contextmanager
     def emit(self, result: Mapping[str, Any]) -> Iterator[None]:
-        """Let what is printed inside be read; with --json the result instead, with --quiet nothing.
+        """Print the output of the block; with --json the result instead, with --quiet nothing.
 
         Args:
             result: plain numbers, texts, lists and mappings.
@@ -68,10 +68,10 @@ _VOICE: ContextVar[OutputMode] = ContextVar("VOICE", default=PLAIN)
 
 
 def output_mode_of_command() -> OutputMode:
-    """Return how the command that is carried out was asked to speak."""
+    """Return the output mode of the command that is carried out."""
     return _VOICE.get()
 
 
 def set_output_mode(output_mode: OutputMode) -> None:
-    """Let the command that is carried out speak so."""
+    """Set the output mode of the command that is carried out."""
     _VOICE.set(output_mode)

@@ -1,8 +1,8 @@
-"""Tell a waiting user how far a command is: a bar on the terminal for anything that takes over a second, and one line
-where the work stands still, or will take hours: where it stands, what costs, what to change.
+"""Report the progress of a command: a bar on the terminal for any work that takes over a second, and one line if the
+work stands still, or will take hours: where it stands, the cause of the cost, and the setting to change.
 
-A thread looks after the work, so that it is told even while machine code does not come back. Compiling is no standing
-still: it is counted, function by function, on the bar, or where there is no terminal on a line that grows.
+A thread watches the work, so that it reports even while machine code does not return. Compiling does not count as
+standing still: it is counted, function by function, on the bar, or without a terminal on a line that grows.
 """
 
 from __future__ import annotations
@@ -25,11 +25,12 @@ if TYPE_CHECKING:
 COMPILING = "Compiling what is not compiled yet (all of it takes about half a minute, once)…"
 
 PATIENCE_S = 1.0
-"""What takes less needs no bar. [s]"""
+"""Shorter work needs no bar. [s]"""
 STANDSTILL_S = 20.0
-"""Work that has not moved for so long is told to stand still; so long is a rate watched before it counts. [s]"""
+"""Work that has not moved for so long is reported to stand still; a rate is watched for so long before it counts.
+[s]"""
 LONG_S = 3600.0
-"""Work that will take longer than this is told. [s]"""
+"""Work that will take longer than this is reported. [s]"""
 CHECK_S = 1.0
 """So often the thread looks. [s]"""
 
@@ -49,43 +50,43 @@ def progress_bar(words: str, costs: Callable[[], str] = str) -> ProgressBar:
 
 
 class ProgressBar:
-    """Called with the fraction that is done, shows a bar once the work has taken a while.
+    """A callable that takes the fraction that is done, and shows a bar once the work has taken a while.
 
-    The bar needs a terminal; that the work stands still is told anywhere, once, and so is that it will take hours.
+    The bar needs a terminal; a standstill is reported anywhere, once, and so is work that will take hours.
 
     Args:
-        words: what is done.
-        console: where to.
-        costs: what costs time in this work, and what to change, in a sentence or two.
+        words: the name of the work.
+        console: the console to print to.
+        costs: the cause of the cost of this work, and the setting to change, in a sentence or two.
     """
 
     def __init__(self, words: str, console: Console, costs: Callable[[], str] = str) -> None:
         self._words, self._console, self._costs = words, console, costs
         self._bar: Progress | None = None
-        self._fraction, self._begun, self._moved = 0.0, monotonic(), monotonic()
+        self._fraction, self._started, self._moved = 0.0, monotonic(), monotonic()
         self._reported: set[str] = set()
         self._counting, self._made, self._opening = False, -1, threading.Lock()
         self._ended = threading.Event()
 
     def __call__(self, fraction: float, words: str = "") -> None:
-        """Show that this fraction, 0 to 1, is done, and what is being done."""
+        """Show that this fraction, 0 to 1, is done, and the task in progress."""
         if fraction != self._fraction or (words and words != self._words):
             self._moved = monotonic()
         self._words, self._fraction = words or self._words, fraction
-        if monotonic() - self._begun > PATIENCE_S:
+        if monotonic() - self._started > PATIENCE_S:
             self._open()
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=fraction, description=self._words)
 
     def check(self) -> None:
-        """Tell if the work stands still, or if its rate so far means hours; each once."""
+        """Report if the work stands still, or if its rate so far means hours; each once."""
         now = monotonic()
         if _compiling():
-            self._begun, self._moved = self._begun + CHECK_S, now
+            self._started, self._moved = self._started + CHECK_S, now
             self._count()
             return
         self._end_count()
-        ran = now - self._begun
+        ran = now - self._started
         left = ran * (1.0 / self._fraction - 1.0) if self._fraction > 0.0 else 0.0
         if now - self._moved >= STANDSTILL_S:
             self._notify("still", f"has not moved on for {now - self._moved:.0f} s")
@@ -116,7 +117,7 @@ class ProgressBar:
             self._made, counting[0] = now, True
 
     def _end_count(self) -> None:
-        """Go back to what is being done, once nothing is compiled any more."""
+        """Return to the task in progress, once nothing is compiled any more."""
         if self._counting:
             self._counting = False
             if self._bar is not None:
@@ -163,12 +164,12 @@ _compilations = [0]
 
 
 def _compiling() -> bool:
-    """Say whether numba is at work."""
+    """Return whether numba is compiling."""
     return _compilations[0] > 0
 
 
 def _listen() -> None:
-    """Let numba say when it compiles, from now on."""
+    """Count the compilations of numba, from now on."""
     from numba.core import event
 
     class Count(event.Listener):  # type: ignore[misc]  # numba has no types
@@ -187,7 +188,7 @@ _listening: list[object] = []
 
 
 def costs_of(trial: scenarios.Trial, tethered: bool = True) -> str:
-    """Return what costs time in a run of a trial, the vehicle's steps or the cable's, and what to change."""
+    """Return the costs of a run of a trial, the vehicle's steps or the cable's, and the setting to change."""
     from subzero.model import Model
     from subzero.simulation.memory_estimate import work_of
 

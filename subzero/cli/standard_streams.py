@@ -43,7 +43,7 @@ class Stream:
             self._drop()
 
     def _drop(self) -> None:
-        """Send what is still in the buffer, and all that follows, to the null device."""
+        """Send the rest of the buffer, and all later output, to the null device."""
         null = os.open(os.devnull, os.O_WRONLY)
         os.dup2(null, self._stream.fileno())
         os.close(null)

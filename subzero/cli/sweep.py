@@ -45,7 +45,7 @@ def sweep(
         workers: processes on this machine; by default one for each of its cores.
         scheduler: address of a Dask scheduler, such as tcp://host:8786, to run on its workers instead.
         retry: run members again that failed.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     if workers is not None and scheduler is not None:
         raise UserError("--workers are processes here, and --scheduler has its own. Leave out one of them.")
@@ -58,7 +58,7 @@ def sweep(
 
 
 def _swept(spec: Path, out: Path | None, executor: Any, retry: bool) -> tuple[dict[str, Any], OutputFolder]:
-    """Run what a file asks for, write all of it, and return the summary and where the files are."""
+    """Run the sweep of a file, write all of it, and return the summary and the paths of the files."""
     from subzero.files.atomic_output import open_output_folder
     from subzero.sweeps.api import finished
     from subzero.sweeps.plan import read_plan
@@ -101,7 +101,7 @@ def add_to(app: cyclopts.App) -> None:
 
 
 LINE_EVERY_S = 30.0
-"""So often a line tells how far it is where there is no terminal for a bar. [s]"""
+"""Interval of the lines that report progress if there is no terminal for a bar. [s]"""
 
 
 class _Bar:

@@ -35,7 +35,7 @@ def list_shipped(*, vehicles: Flag = False, cables: Flag = False, output_mode: O
     Args:
         vehicles: list the vehicles.
         cables: list the cables.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from scenarios.contents import first_line
     from scenarios.files import shipped
@@ -57,8 +57,8 @@ def new(path: Path, /, *, like: str = "fig6", output_mode: OutputMode = PLAIN) -
 
     Args:
         path: file to make, such as my_trial.toml; one that exists is left alone.
-        like: what to copy: a name of "subzero list", "subzero list --vehicles" or "subzero list --cables".
-        output_mode: how the command speaks.
+        like: the file to copy: a name of "subzero list", "subzero list --vehicles" or "subzero list --cables".
+        output_mode: the form of the output.
     """
     from scenarios.contents import locate
     from subzero.files.read_file import make_toml
@@ -85,7 +85,7 @@ def show(name: str, /, *, output_mode: OutputMode = PLAIN) -> int:
 
     Args:
         name: a shipped name (see "subzero list"), or the path of a TOML file.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     from scenarios.contents import contents
 
@@ -105,8 +105,8 @@ def validate(path: Path, /, *, output_mode: OutputMode = PLAIN) -> int:
     """Check a file without running it: a scenario, vehicle, cable or sweep (TOML); commands or a record (CSV).
 
     Args:
-        path: the file. All its problems are told at once, each with its line and what is allowed.
-        output_mode: how the command speaks.
+        path: the file. All its problems are reported at once, each with its line and the allowed values.
+        output_mode: the form of the output.
     """
     kind, reported = _record(path) if path.suffix == ".csv" else _toml(path)
     with output_mode.emit({"path": printable(str(path)), "kind": kind, "valid": True, "about": reported}):
@@ -122,7 +122,7 @@ def add_to(app: cyclopts.App) -> None:
 
 
 def _toml(path: Path) -> tuple[str, str]:
-    """Return what a TOML file is, and what is in it; refuse one that cannot be used."""
+    """Return the kind and the contents of a TOML file; raise an error if it cannot be used."""
     from scenarios.contents import contents, locate
     from scenarios.files import read_toml
 
@@ -140,11 +140,14 @@ def _toml(path: Path) -> tuple[str, str]:
     found = contents(path)
     if kind == "vehicle":
         _check_vehicle(found)
-    return kind, f"{len(found.numbers)} numbers, {_outside(found)} outside their own plausible range"
+    return (
+        kind,
+        f"{len(found.numbers)} numbers, {_count_implausible(found)} outside their own plausible range",
+    )
 
 
 def _check_vehicle(found: Contents) -> None:
-    """Refuse a vehicle that its own equations refuse."""
+    """Raise an error for a vehicle that its own equations refuse."""
     from scenarios.parts import nested
     from vehicle import from_mapping
 
@@ -152,7 +155,7 @@ def _check_vehicle(found: Contents) -> None:
     from_mapping(numbers)
 
 
-def _outside(found: Contents) -> int:
+def _count_implausible(found: Contents) -> int:
     return sum(
         not number.low <= number.values[0] <= number.high
         for number in found.numbers
@@ -161,7 +164,7 @@ def _outside(found: Contents) -> int:
 
 
 def _record(path: Path) -> tuple[str, str]:
-    """Return what a CSV file is, and what is in it; refuse one that cannot be used."""
+    """Return the kind and the contents of a CSV file; raise an error if it cannot be used."""
     from scenarios.samples import check_times, read_csv
     from subzero.files.read_file import MOST_OF_A_CSV, UnreadableFileError, read_text
     from subzero.records.record import read_record

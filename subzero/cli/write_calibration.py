@@ -1,5 +1,5 @@
-"""Deliver a calibration: the vehicle's file, JSON (docs/calibration.md explains every key), figures, and what is told
-on the terminal.
+"""Write a calibration: the vehicle's file, JSON (docs/calibration.md explains every key), figures, and the text on
+the terminal.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from subzero.files.atomic_output import OutputFolder
 
 ENDINGS = (".toml", "_cable.toml", ".json", "_numbers.png", "_errors.png", "_profiles.png")
-"""Of the files that are written, behind the name of the vehicle."""
+"""Endings of the files that are written, after the name of the vehicle."""
 
 
 def files_of(out: Path) -> tuple[str, ...]:
@@ -63,7 +63,7 @@ def write_all(found: Calibration, output_folder: OutputFolder, stem: str) -> Non
 def print_calibration(
     found: Calibration, output_folder: OutputFolder, out: Path, *, output_mode: OutputMode = PLAIN
 ) -> None:
-    """Print the numbers, what the records do not determine, and where the files are."""
+    """Print the numbers, the undetermined directions, and the paths of the files."""
     with output_mode.emit(plain(mapping(found)) | output_folder.files()):
         _print(found, output_folder, out, Console())
 
@@ -87,15 +87,15 @@ def _print(found: Calibration, output_folder: OutputFolder, out: Path, console: 
 
 FORMAT = "subzero calibration 1"
 STRONG = 0.9
-"""Correlations from this size on are told. [-]"""
+"""Correlations from this size on are reported. [-]"""
 MOST_TOLD = 3
-"""So many directions, correlations and trials are told on the terminal; the JSON file has all."""
+"""Number of directions, correlations and trials that are printed on the terminal; the JSON file has all."""
 WORTH_FLYING = 1.2
 """A trial that makes no interval this many times narrower is not advised. [-]"""
 
 
 def rows(found: Calibration) -> list[tuple[str, str, str, str, str]]:
-    """Return a row for every number: name, before, after, the interval of 95 %, and what to know of it."""
+    """Return a row for every number: name, before, after, the interval of 95 %, and remarks."""
     return [
         (
             _short(estimate.name),
@@ -109,7 +109,7 @@ def rows(found: Calibration) -> list[tuple[str, str, str, str, str]]:
 
 
 def _mark(estimate: Estimate) -> str:
-    """Return by how much a number has changed, and whether the records say so."""
+    """Return by how much a number has changed, and whether the records determine it."""
     change = f"{100.0 * estimate.change:+.1f} %" if estimate.before else ""
     words = [
         change,
@@ -120,7 +120,7 @@ def _mark(estimate: Estimate) -> str:
 
 
 def headline(found: Calibration) -> str:
-    """Return what was gained, in one sentence; or that nothing was."""
+    """Return the gain in one sentence; or that there was none."""
     if found.refused:
         return "Nothing comes near these records: the numbers above are no calibration, and no vehicle is written."
     count, moved = len(found.estimates), sum(estimate.is_determined for estimate in found.estimates)
@@ -131,7 +131,7 @@ def headline(found: Calibration) -> str:
 
 
 def story(found: Calibration) -> Iterator[str]:
-    """Give the lines that belong below the table; where nothing came near, why, and what to do."""
+    """Yield the lines that belong below the table; where nothing came near, the reason and the remedy."""
     if found.refused:
         yield from (*found.refused[:MOST_TOLD], REMEDY, *found.notes)
         return
@@ -148,7 +148,7 @@ def story(found: Calibration) -> Iterator[str]:
 
 
 def advised(advice: Advice) -> str:
-    """Return a trial to fly, and what it would make sharper."""
+    """Return a trial to fly, and the numbers that it would make sharper."""
     sharper = [(name, factor) for name, factor in advice.sharper.items() if factor >= WORTH_FLYING][
         :MOST_TOLD
     ]

@@ -1,4 +1,4 @@
-"""Deliver a diagnosis: all its files, its page, and what is told on the terminal, before it and after it.
+"""Write a diagnosis: all its files, its page, and the text on the terminal, before it and after it.
 
 In the replay of the page the model that explains the first record best is solid, with its cable; the nominal simulation
 and the measured vehicle are ghosts.
@@ -60,7 +60,7 @@ Run = Callable[["Setting"], "xr.Dataset"]
 """Simulates a setting as the diagnosis has simulated it."""
 
 MOST_ROWS = 12
-"""So many causes that cannot be told apart are shown on the terminal; the report has them all."""
+"""Number of indistinguishable causes that are shown on the terminal; the report has them all."""
 
 
 def print_plan(rows: Sequence[Detectability], console: Console | None = None) -> None:
@@ -78,7 +78,7 @@ def print_plan(rows: Sequence[Detectability], console: Console | None = None) ->
 
 
 def _print_unreported(verdict: Verdict, console: Console) -> None:
-    """Print which causes these records cannot show, or not tell apart, behind what they do show."""
+    """Print which causes these records cannot show, or not distinguish, after those that they do show."""
     hidden = tables.detectable(verdict)
     if not hidden.rows:
         return
@@ -96,14 +96,14 @@ def print_diagnosis(
     scenario: str = "SCENARIO",
     output_mode: OutputMode = PLAIN,
 ) -> None:
-    """Print a verdict in words, what cannot be told, and where the files are.
+    """Print a verdict in words, the questions that remain open, and the paths of the files.
 
     Args:
         verdict: of `subzero.diagnose`.
         output_folder: where the files are.
         console: where to print.
         scenario: the trial as the user named it, a name or a path, for lines of the shell.
-        output_mode: how the command speaks.
+        output_mode: the form of the output.
     """
     with output_mode.emit(json_file.mapping(verdict) | output_folder.files()):
         _print(verdict, output_folder, console or Console(), scenario)
@@ -132,14 +132,15 @@ def _print(verdict: Verdict, output_folder: OutputFolder, console: Console, scen
 COLUMN_GAP = 3
 """So many letters stand between two columns, at most."""
 SENTENCE_LETTERS = 20
-"""A line of a sentence has at least so many, where there is room."""
+"""Least number of letters in a line of a sentence, if the terminal is wide enough."""
 
 
 def _rich(table: tables.Table, width: int) -> Table:
-    """Return a table for a terminal of some letters: no word and no id is broken, sentences between their words.
+    """Return a table for a terminal of a given width: words and ids are not broken, sentences are broken between
+    words.
 
-    Where there is no room for every column to be readable, the longest ones in the middle are left out; the report has
-    them.
+    If the terminal is too narrow for all columns to be readable, the longest ones in the middle are left out; the
+    report has them.
     """
     columns = [(name, [row[at] for row in table.rows]) for at, name in enumerate(table.header)]
     while len(columns) > 2 and sum(_readable(*column) + COLUMN_GAP for column in columns) > width:
@@ -178,7 +179,7 @@ def write_all(
         verdict: of `subzero.diagnose`.
         logged: the records that were explained.
         output_folder: where to.
-        run: simulates what the page replays.
+        run: simulates the settings that the page replays.
         effects: causes of the user's own.
         effects_file: where they are from.
     """
@@ -236,8 +237,8 @@ def page_of_diagnosis(
         verdict: of `subzero.diagnose`.
         logged: the records that were explained; the first one is replayed.
         figures: by name.
-        command: the line that does it again.
-        run: simulates what is replayed.
+        command: the command line that repeats it.
+        run: simulates a setting for the replay.
         extended_toml: text of the extended model's file.
         effects: causes of the user's own.
     """
@@ -268,7 +269,7 @@ def page_of_diagnosis(
 
 
 def about(logged: Sequence[Logged]) -> dict[str, str]:
-    """Return what records are, each in a line."""
+    """Return descriptions of the records, each in a line."""
     return {
         trial.name: f"{trial.record.source}, trial {trial.setting.trial.name}. {' '.join(trial.notes)}".strip()
         for trial in logged
@@ -276,7 +277,7 @@ def about(logged: Sequence[Logged]) -> dict[str, str]:
 
 
 def _outcome(verdict: Verdict, logged: Sequence[Logged]) -> list[Line]:
-    """Return the verdict, and what it is about."""
+    """Return the verdict, and the trial and records it is about."""
     kind: Any = "good" if verdict.verdict in (NOTHING_WRONG, CAUSE_NAMED) and verdict.complete else "bad"
     records = [
         Line(text=f"{trial.name}: {trial.record.time.size} samples, {len(trial.record.values)} channels")
@@ -315,7 +316,7 @@ def _sources(logged: Sequence[Logged], extended_toml: str) -> dict[str, str]:
 def replayed(
     verdict: Verdict, logged: Logged, run: Run, effects: Iterable[Effect] = ()
 ) -> tuple[tuple[Actor, ...], str]:
-    """Return who moves in the replay of a record, and what is said of them; nobody if there is nothing to see.
+    """Return the actors in the replay of a record, and a sentence about them; no actors if there is nothing to see.
 
     Args:
         verdict: of the diagnosis; of one that was interrupted there is no replay.
@@ -371,7 +372,7 @@ def _best(verdict: Verdict) -> tuple[str, Extended | None]:
 
 
 def _about(trial: Logged) -> dict[str, object]:
-    """Return what diagnosis.json says of a record."""
+    """Return the entry of a record in diagnosis.json."""
     return {
         "source": trial.record.source,
         "scenario": trial.setting.trial.name,

@@ -1,4 +1,4 @@
-"""What the commands of manoeuvres and autopilots leave behind: files, a table of indices, and one figure.
+"""Write the results of manoeuvres and autopilots: files, a table of indices, and one figure.
 
 The figure shows track, heading, speed and command, with the cable and without.
 """
@@ -98,7 +98,7 @@ def print_flights(
 
 
 def _number(value: float) -> float | None:
-    """Return a plain float that JSON can hold: None for what does not exist."""
+    """Return a plain float that JSON can hold: None for a number that does not exist."""
     return float(value) if math.isfinite(value) else None
 
 

@@ -1,4 +1,4 @@
-"""Deliver the runs of a command: all their files, and what is told on the terminal."""
+"""Write the runs of a command: all their files, and the text on the terminal."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def write_all(
 
     Args:
         runs: by label.
-        record: what was measured, if anything was.
+        record: the measured record, if there is one.
         output_folder: where to.
         width: of the figures; None for two columns of a page. [inch]
         kind: of the figures: png, svg or pdf.
@@ -69,7 +69,9 @@ def write_all(
 
 
 def check_pictures(width: float | None, film: str | None) -> None:
-    """Refuse figures that cannot be so wide, and a film that cannot be made here, before anything is simulated."""
+    """Raise an error for figures that cannot be so wide, and a film that cannot be made here, before any
+    simulation.
+    """
     if width is not None:
         from subzero.figures import page_width
 

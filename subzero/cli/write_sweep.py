@@ -1,4 +1,4 @@
-"""What the command leaves behind: dataset, table, summary, figures, page; and tells: numbers and what matters.
+"""Write the results of a sweep: dataset, table, summary, figures, page; and print numbers and the main effects.
 
 The processes that ran the members draw the figures at the same time.
 """
@@ -39,11 +39,11 @@ FIGURES = ("bands", "histograms", "against", "tornado")
 """All that there may be, in the order in which a page has them."""
 LONGEST_FIRST = ("against", "histograms", "bands", "tornado")
 FILES = (RESULT, TABLE, "summary.json", "report.html", *(f"{name}.png" for name in FIGURES))
-"""What a sweep writes beside its store."""
+"""Files that a sweep writes in addition to its store."""
 SHOWN_REASONS = 5
-"""So many members that failed are told with their reason. [-]"""
+"""Number of failed members that are reported with their reason. [-]"""
 KEPT_REASONS = 100
-"""So many stand in the summary; the table has all."""
+"""Number of failed members in the summary; the table has all."""
 
 
 def write_sweep(
@@ -77,7 +77,7 @@ def write_sweep(
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """What figures show: points, what was run, what came of it, what matters; and what stands above and below."""
+    """The data of the figures: points, results, main effects; and the texts above and below."""
 
     points: Points
     job: Job
@@ -104,7 +104,7 @@ def pictures(shown: Shown, pool: WorkerPool | None = None) -> dict[str, Picture]
         for name, each in asked.items():
             try:
                 made |= each.result()
-            except BrokenExecutor:  # somebody killed it: no member is lost by that, and no figure
+            except BrokenExecutor:  # a user killed it: no member is lost by that, and no figure
                 made |= drawn_here(shown, [name])
     return {name: made[name] for name in FIGURES if name in made}
 
@@ -167,7 +167,7 @@ def _in_short(summary: dict[str, Any]) -> str:
 def print_sweep(
     summary: dict[str, Any], output_folder: OutputFolder, output_mode: OutputMode = PLAIN
 ) -> None:
-    """Print what came of a sweep."""
+    """Print the outcomes of a sweep."""
     with output_mode.emit(summary | output_folder.files()):
         _print(summary, output_folder, Console())
 
@@ -186,7 +186,7 @@ def _print(summary: dict[str, Any], output_folder: OutputFolder, console: Consol
 
 
 def _rich(rows: Rows, *, words: int) -> Table:
-    """Return rows as the terminal shows them: `words` columns of words, and numbers behind."""
+    """Return rows as the terminal shows them: `words` columns of words, then numbers."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for at, name in enumerate(rows.header):
         table.add_column(escape(name), justify="left" if at < words else "right", overflow="fold")

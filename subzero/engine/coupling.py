@@ -11,7 +11,7 @@ evaluations do. An exchange that does not converge is tried again in halves.
 
 The exchange is of second order, and stable for a cable of any weight. A loose one (the force of the step before) is not
 for a cable heavier than the vehicle; nor is a force that goes linearly from F_n to F_{n+1}: a heavy cable then answers
-with z² + 4z + 1 = 0, root −3.73. With the slope of the exchange before, the largest root stays below 0.73.
+with z² + 4z + 1 = 0, root −3.73. With the slope of the exchange before, the largest root remains below 0.73.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MOST_EXCHANGES = 60
 ROUNDING = 1e-14
 """Places are known to this fraction, and forces to this times the cable's stiffness. [-]"""
 NOTABLE = 0.01
-"""Smaller forces need agree no closer than this one does: where a slack cable floats beside a drifting vehicle,
+"""Smaller forces need agree no closer than this one does: where a slack cable floats near a drifting vehicle,
 exchanges hardly make its ten thousandths of a newton agree to six digits of themselves. [N]"""
 MOST_HALVINGS = 8
 FASTEST = 50.0
@@ -59,7 +59,7 @@ def exchange(setup: Setup, live: Live, start: float, span: float) -> int:
                 return FINE
             step = min(
                 2.0 * step, span - done
-            )  # what was hard may be behind: never stay at short steps for good
+            )  # the difficult time may have passed: short steps are not kept for good
         else:
             live.line.ends.drum_mode = mode
             step *= 0.5
@@ -119,7 +119,7 @@ def _agree(setup: Setup, live: Live, start: float, span: float) -> int:
 
 @compiled
 def forget(setup: Setup, live: Live) -> None:
-    """Forget what only makes guesses better: where a state is set anew, it is of another one."""
+    """Discard all that only improves guesses: where a state is set again, it belongs to another one."""
     for i in range(3):
         live.now.missed[i] = 0.0
     _mobility(setup.fixed.r_c, setup.fixed.vehicle.inverse_mass, live.now.mobility)
@@ -154,7 +154,7 @@ def _move(setup: Setup, live: Live, start: float, span: float) -> bool:
 
 @compiled
 def _forces_agree(now: Now, F: np.ndarray, agreement: float) -> bool:
-    """Say whether the cable answers with the force that the hull was pulled by, as far as rounding lets one say."""
+    """Return whether the cable responds with the force that the hull was pulled by, as far as rounding allows."""
     size, gap, stiffness, reach = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         size = max(size, abs(F[i]))
@@ -250,7 +250,7 @@ def _learn(now: Now, span: float) -> None:
 @compiled
 def _solve_three(M: np.ndarray, b: np.ndarray) -> None:
     """Overwrite b (3,) with M⁻¹b by elimination without pivoting: M is the identity plus a stiffness times a mobility,
-    whose leading minors stay positive.
+    whose leading minors are always positive.
     """
     for k in range(3):
         for i in range(k + 1, 3):

@@ -153,7 +153,7 @@ def take_jolt_of_motion(setup: Setup, live: Live, start: float) -> None:
 
 @inner
 def _rate(track: np.ndarray, angle: int, row: int) -> float:
-    """Return the rate of pitch or heading from a row to the next, 0 behind the last. [rad/s]."""
+    """Return the rate of pitch or heading from a row to the next, 0 after the last. [rad/s]."""
     if row >= track.shape[1] - 1:
         return 0.0
     return (track[angle, row + 1] - track[angle, row]) / (track[TIME, row + 1] - track[TIME, row])

@@ -1,4 +1,4 @@
-"""From plain values to what compiled code takes: how the drum moves, and what its winch does."""
+"""Convert plain values to those of compiled code: the motion of the drum, and the control of its winch."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from subzero.model import Model
 
 
 def drum_of(model: Model) -> DrumProperties | Winch:
-    """Return the free drum, or what turns it."""
+    """Return the free drum, or the winch."""
     winch = model.winch
     if winch is None:
         return model.drum
@@ -25,7 +25,7 @@ def drum_of(model: Model) -> DrumProperties | Winch:
 
 
 def drum_direction(trial: scenarios.Trial, model: Model, wet: float) -> np.ndarray:
-    """Return where the drum goes, and what its winch is asked for, from a length `wet` [m] on, as `cable.drum_motion`.
+    """Return the way of the drum, and the setpoint of its winch, from a length `wet` [m] on, as `cable.drum_motion`.
 
     The times are those of the exchanges, and of all changes of winch and vessel: between them a velocity is linear, so
     the way is summed up exactly.
@@ -55,5 +55,5 @@ def _times(trial: scenarios.Trial, model: Model) -> np.ndarray:
 
 
 def _follow(time: tuple[float, ...], values: tuple[float, ...]) -> Callable[[float], float]:
-    """Return the function that is linear between values at times, and constant behind the last."""
+    """Return the function that is linear between values at times, and constant after the last."""
     return lambda t: float(np.interp(t, time, values))

@@ -1,4 +1,4 @@
-"""What acts on the hull from outside: the pull of the cable, the water that it goes through, a force the model lacks.
+"""External forces on the hull: the pull of the cable, the water that it goes through, a force the model lacks.
 
     F_c = Rᵀ F,    M_c = r_c × F_c                                                                        (12)-(13)
 

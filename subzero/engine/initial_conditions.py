@@ -1,4 +1,4 @@
-"""The start of a run: from a trial and a model to what stays and what changes.
+"""The start of a run: the constants and the state of a run, from a trial and a model.
 
 The cable is laid straight behind the vehicle, or hangs at rest between it and a drum that is somewhere else.
 
@@ -8,7 +8,7 @@ it. The water around the vehicle is taken as uniform.
 
 A model may change in mid-run (a fin is struck, the cable is caught, a current sets in): the run then starts again
 from where it stands, with other numbers. Vehicle, cable and drum keep position and speed. The energy that a sudden
-change of a mass would take is not booked.
+change of a mass would take is not recorded.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ NO_WEIGHT = 1e-4
 """A cable that weighs less in water is neutral. [N/m]"""
 NOTHING = MissingForce()
 FIRST_ROOM = 16
-"""Segments that a new cable has room for, beyond those that are in the water."""
+"""Segments that are allocated for a new cable, beyond those that are in the water."""
 
 
 def prepare(
@@ -74,16 +74,16 @@ def prepare(
     run_in: float = RUN_IN,
     room: int = FIRST_ROOM,
 ) -> tuple[Setup, Live]:
-    """Return what stays and what changes in a run, at its start: the cable laid straight behind the vehicle.
+    """Return the constants and the state of a run at its start: the cable laid straight behind the vehicle.
 
     Args:
-        trial: what is simulated.
+        trial: the trial to simulate.
         model: vehicle, cable, drum and water.
         tethered: with the cable of the default scheme.
         state: another first state than that of the trial.
-        longest_exchange: there is room for the hull's steps in so long an exchange; that of the trial by default. [s]
+        longest_exchange: longest exchange to allocate the hull's steps for; that of the trial by default. [s]
         run_in: length up to which a cable that begins shorter, on a free drum, has short segments; 0 for even ones. [m]
-        room: for so many segments beyond those in the water.
+        room: number of segments to allocate beyond those in the water.
 
     Raises:
         UserError: a start that cannot be.
@@ -117,7 +117,9 @@ def prepare(
 
 
 def _needed_last(setup: Setup, live: Live) -> list[Call]:
-    """Return what a run calls last, in its order, and for which arguments: half of what it compiles."""
+    """Return the last functions that a run calls, in its order, and their arguments: half of the code that it
+    compiles.
+    """
     kind, now = numba.typeof, numba.typeof(live.now)
     line, work, c, drum = (kind(each) for each in (live.line, live.load, setup.fixed.cable, setup.fixed.drum))
     step, vector, row = numba.float64, numba.float64[::1], numba.int64
@@ -151,7 +153,7 @@ def _new_now() -> Now:
 
 
 def _can_run_in(fixed: Fixed) -> bool:
-    """Say whether a cable may begin with short segments: one on a free drum, that is held there or weighs nothing.
+    """Return whether a cable may begin with short segments: one on a free drum, that is held there or weighs nothing.
 
     Else its direction at the drum is open (all waves leave), and short segments would follow whatever comes.
     """
@@ -161,7 +163,7 @@ def _can_run_in(fixed: Fixed) -> bool:
 
 
 def setup_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Setup:
-    """Return what stays in a run; where its drum is, is still to be filled in."""
+    """Return the constants of a run; the place of its drum is still to be filled in."""
     added, terms = (model.missing or NOTHING).numbers()
     return Setup(
         fixed=_fixed(trial, model, tethered, bool(added.size or terms.size)),
@@ -252,7 +254,7 @@ def _track(trial: scenarios.Trial) -> np.ndarray:
 
 
 def hang_between(setup: Setup, live: Live, trial: scenarios.Trial, model: Model) -> None:
-    """Move the drum to where the trial has it, and let the cable in the water hang between it and the tow point.
+    """Move the drum to its place in the trial, with the cable in the water hanging between it and the tow point.
 
     Raises:
         cable.HoldError: a cable that does not reach, or has no equilibrium.
@@ -275,7 +277,7 @@ def hang_between(setup: Setup, live: Live, trial: scenarios.Trial, model: Model)
 
 @compiled
 def start_at_rest(setup: Setup, live: Live) -> None:
-    """Fill what a cable that is laid out has at the start: the water around it, its momenta, its energy."""
+    """Fill the state of a cable that is laid out at the start: the water around it, its momenta, its energy."""
     start_in_water(live.line, setup.water, setup.fixed.cable, live.load)
     energy_flow(live.line, setup.fixed.cable, live.load, live.now.ledger.cable_new)
     for i in range(FLOWS):
@@ -310,7 +312,7 @@ def first_state(trial: scenarios.Trial, model: Model, tethered: bool) -> np.ndar
 
 
 def _check_fins(start: scenarios.Start, model: Model) -> None:
-    """Refuse fins beyond what their servos reach."""
+    """Raise an error for fins beyond the range of their servos."""
     for fin, angle in zip(FINS, start.fins, strict=True):
         most = getattr(model.vehicle, f"{fin}_servo").deflection_limit
         if abs(angle) > most * (1.0 + 1e-12):
@@ -362,7 +364,7 @@ CLOSE = 1e-6
 def rows_of_changes(
     trial: scenarios.Trial, tethered: bool, times: np.ndarray, later: Later
 ) -> dict[int, Model]:
-    """Return the rows from which on other models hold; refuse what cannot be done.
+    """Return the rows from which on other models hold; raise an error for changes that are not possible.
 
     Raises:
         UserError: a scheme that cannot change, or a time that is none of the run's.
@@ -386,7 +388,9 @@ def rows_of_changes(
 def go_on_with(
     model: Model, setup: Setup, live: Live, trial: scenarios.Trial, tethered: bool, time: float
 ) -> Setup:
-    """Return what stays in a run that goes on with another model from `time` [s] on; `live` is made ready for it."""
+    """Return the constants of a run that continues with another model from `time` [s]; update `live` for that
+    model.
+    """
     other = setup_of(trial, model, tethered)
     other.fixed.drum_place[:] = setup.fixed.drum_place
     other.water.points[:3] = setup.water.points[:3]

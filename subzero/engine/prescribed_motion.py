@@ -99,7 +99,7 @@ def _integral(t: np.ndarray, rate: np.ndarray) -> np.ndarray:
 
 
 def _refuse_contradiction(motion: scenarios.Motion, velocity: np.ndarray, table: np.ndarray) -> None:
-    """Refuse places that move otherwise than the speeds say: a wrong sign or unit, or nothing but noise."""
+    """Raise an error for places that contradict the speeds: a wrong sign or unit, or nothing but noise."""
     h = np.diff(motion.time)
     usual = float(np.sqrt(np.mean(np.sum(velocity**2, axis=0))))
     for i, name in enumerate(COORDINATES):

@@ -1,4 +1,4 @@
-"""What a run keeps: one row per time of the run, or per so many, shapes packed one behind another.
+"""The results of a run: one row per time of the run, or per so many, shapes packed one after another.
 
 Every time writes its row. Where only every so many are kept (`stride`), the next one writes over it: so the rows that
 are kept are the same to the last bit as without, and the last one is where the run ended.
@@ -20,7 +20,7 @@ from subzero.jit import compiled
 from vehicle import BREAKDOWN, STATE_SIZE, battery_voltage, breakdown, deflections, euler_angles
 
 BREATH_S = 0.1
-"""Compiled code computes for about so long before Python moves the progress bar and heeds an interrupt. [s]"""
+"""Compiled code computes for about so long before Python moves the progress bar and handles an interrupt. [s]"""
 MOST_QUICKER = 2.0
 """So many times as many rows are filled at a time as the last time, at most: with more cable, later ones take longer.
 [-]"""
@@ -91,7 +91,7 @@ class Run:
 
 
 class Grid(NamedTuple):
-    """The times of a run and what is kept.
+    """The times of a run and the rows to keep.
 
     Attributes:
         times: (n,). [s]
@@ -109,11 +109,11 @@ class Grid(NamedTuple):
 
 
 class RunState(NamedTuple):
-    """Where a run stands between two calls of `subzero.engine.time_loop.run_rows`.
+    """The position of a run between two calls of `subzero.engine.time_loop.run_rows`.
 
     Attributes:
         setup, live, recording: the run.
-        behind: how many of its times are behind.
+        behind: how many of its times are done.
         used: nodes of the recording in use, in rows that are kept.
         ending: how the last call ended.
     """
@@ -130,7 +130,7 @@ class Pace:
     """How many rows compiled code fills at a time, from one on to as many as it fills within `BREATH_S`.
 
     Attributes:
-        rows: how many; measured anew each time that it is entered and left.
+        rows: how many; measured again each time that it is entered and left.
     """
 
     def __init__(self) -> None:
@@ -148,7 +148,7 @@ class Pace:
 
 
 def new_recording(rows: int, nodes: int, times: int = 0) -> Recording:
-    """Return an empty recording of `rows` rows, with room for `nodes` nodes in all, and a trace of `times` times."""
+    """Return an empty recording of `rows` rows, with space for `nodes` nodes in all, and a trace of `times` times."""
     shapes = {
         "trace": (times, 4),
         "state": (rows, STATE_SIZE),
@@ -243,7 +243,7 @@ BY_NODE, BY_TIME = ("position", "tension", "arc_length"), ("trace",)
 
 
 def cut(recording: Recording, rows: int, used: int) -> Recording:
-    """Return the part of a recording that is filled; its trace stays as it is."""
+    """Return the part of a recording that is filled; its trace is not changed."""
     filled = {name: getattr(recording, name)[:used] for name in BY_NODE}
     filled |= {name: getattr(recording, name) for name in BY_TIME}
     by_row = {name: values[:rows] for name, values in recording._asdict().items() if name not in filled}
@@ -253,18 +253,18 @@ def cut(recording: Recording, rows: int, used: int) -> Recording:
 def thinned(run: Run, stride: int) -> Run:
     """Return every so many rows of a run, and its last one."""
     rows = np.arange(run.times.size)
-    stays = (rows % stride == 0) | (rows == rows[-1])
-    nodes = np.repeat(stays, run.recording.nodes)
+    keep = (rows % stride == 0) | (rows == rows[-1])
+    nodes = np.repeat(keep, run.recording.nodes)
     kept = {name: getattr(run.recording, name)[nodes] for name in BY_NODE}
     kept |= {name: getattr(run.recording, name) for name in BY_TIME}
-    by_row = {name: values[stays] for name, values in run.recording._asdict().items() if name not in kept}
-    return replace(run, times=run.times[stays], recording=Recording(**by_row | kept))
+    by_row = {name: values[keep] for name, values in run.recording._asdict().items() if name not in kept}
+    return replace(run, times=run.times[keep], recording=Recording(**by_row | kept))
 
 
 def run_so_far(
     grid: Grid, recording: Recording, behind: int, used: int, message: str, *, completed: bool
 ) -> Run:
-    """Return a run of which so many times are behind, with `used` nodes in the rows that are kept for good."""
+    """Return a run with so many times done, and `used` nodes in the rows that are kept for good."""
     times, last = grid.times[:behind], row_of(behind - 1, grid.stride)
     if (behind - 1) % grid.stride:
         used += int(recording.nodes[last])

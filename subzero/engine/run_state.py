@@ -1,4 +1,4 @@
-"""What a coupled run is made of, as named tuples that compiled code takes: what stays, and what changes."""
+"""The data of a coupled run, as named tuples that compiled code takes: the constants and the state."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ TIME, SPEED, PITCH, HEADING = range(4)
 
 LINEAR_ROWS = 4
 PLACE, SLOPE, KNOT_ROWS = 1, 7, 13
-"""Rows of a smooth one (13, n), behind that of time: x, y, z [m], φ, θ, ψ [rad], and how fast each of them changes."""
+"""Rows of a smooth one (13, n), after that of time: x, y, z [m], φ, θ, ψ [rad], and the rate of each of them."""
 
 
 class HullWork(Record):
@@ -85,7 +85,7 @@ class Now(Record):
         missed: by how much the pull came out other than straight on from the two before it, in the last exchange (3,).
             [N]
         guess: pull at the end of the exchange that is being tried (3,). [N]
-        change: what the last guess was changed by (3,). [N]
+        change: the last change of the guess (3,). [N]
         tow: tow point there, relative to the drum (3,). [m]
         Z: answer of the pull to the tow point's place (3, 3). [N/m]
         tow_before: the same for the guess before (3,). [m]
@@ -114,14 +114,14 @@ class Now(Record):
 
 
 class Setup(NamedTuple):
-    """What does not change during a run.
+    """The constants of a run.
 
     Attributes:
         fixed: numbers; `drum` in it is where the drum is at the end of the step that is being tried.
-        orders, track: what the vehicle is told, or how it moves (LINEAR_ROWS or KNOT_ROWS, n).
+        orders, track: the commands to the vehicle, or its motion (LINEAR_ROWS or KNOT_ROWS, n).
         water: how the water moves; its origin is the drum's place at the start.
-        led: how the drum moves, and what its winch is asked for, see `cable.drum_motion` (n, 8).
-        added, terms: what the model lacks, see `MissingForce.numbers` (7, n), (m, 5); empty for nothing.
+        led: motion of the drum, and setpoint of its winch, see `cable.drum_motion` (n, 8).
+        added, terms: the missing force, see `MissingForce.numbers` (7, n), (m, 5); empty for none.
     """
 
     fixed: Fixed
@@ -134,7 +134,7 @@ class Setup(NamedTuple):
 
 
 class Live(NamedTuple):
-    """What changes during a run.
+    """The state of a run.
 
     Attributes:
         now: where it stands.

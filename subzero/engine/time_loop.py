@@ -20,7 +20,7 @@ from subzero.engine.run_state import Live, Setup
 from subzero.jit import allocating, compiled, deferred_signals
 
 NO_ROOM = 4
-"""The room that was reserved is nearly full: enlarge it and go on. The other endings are in `coupling`."""
+"""The allocated memory is nearly full: enlarge it and go on. The other endings are in `coupling`."""
 SPARE = 8
 """Nodes that one exchange may add. (A tow point at 40 segments a second would need more: `coupling.FASTEST`.)"""
 
@@ -37,11 +37,11 @@ def run_rows(
     parts: int,
     stride: int,
 ) -> tuple[int, int, int]:
-    """Go from times[first − 1] to times[last − 1], and fill the rows of a recording on the way.
+    """Advance from times[first − 1] to times[last − 1], and fill the rows of a recording on the way.
 
     Args:
-        setup: what stays.
-        live: what changes; at times[first − 1] when called.
+        setup: the constants.
+        live: the state; at times[first − 1] when called.
         recording: filled.
         times: of the run (n,). [s]
         first: time to begin with; 0 writes the row of the start, too.
@@ -51,8 +51,8 @@ def run_rows(
         stride: every so many times are kept as a row, see `recording`.
 
     Returns:
-        times that are behind, nodes in use in rows that are kept, and how it ended (`coupling.FINE` …);
-        `line.ends.solved` tells how the cable's last step was solved.
+        number of times that are done, nodes in use in rows that are kept, and the ending (`coupling.FINE` …);
+        `line.ends.solved` holds how the cable's last step was solved.
     """
     for at in range(first, last):
         ending = _reach(setup, live, recording, times, at, used, parts) if at > 0 else FINE
@@ -61,7 +61,7 @@ def run_rows(
         row = row_of(at, stride)
         after = record_row(setup, live, recording, row, times[at], used)
         note(recording, row, at)
-        if at % stride == 0:  # the row stays; else the next one is written over it
+        if at % stride == 0:  # the row is kept; else the next one is written over it
             used = after
     return last, used, FINE
 
@@ -72,7 +72,7 @@ def _reach(
 ) -> int:
     """Go from times[at − 1] to times[at]; return how that ended.
 
-    Arrays cannot grow in here: stop before they are full, and let Python enlarge them and call again.
+    Arrays cannot grow in here: stop before they are full, so that Python can enlarge them and call again.
     """
     nodes = live.line.ends.count + 1 + SPARE * parts
     if nodes > live.line.length.size or used + live.line.length.size > recording.tension.size:
@@ -93,12 +93,12 @@ class _HandleType(types.StructRef):
     """What compiled code takes a handle for."""
 
     def preprocess_fields(self, fields: Any) -> Any:
-        """Let fields have no literal types."""
+        """Declare that fields have no literal types."""
         return tuple((name, types.unliteral(kind)) for name, kind in fields)
 
 
 class _Reference(structref.StructRefProxy):
-    """A run as one pointer; the arrays must be kept alive by whoever made it."""
+    """A run as one pointer; the caller that made it must keep the arrays alive."""
 
 
 class _Interpreted(NamedTuple):
@@ -116,7 +116,7 @@ Handle: Any = _Interpreted if numba.config.DISABLE_JIT else _Reference
 
 
 ROW, USED, ENDING = range(3)
-"""Where a held run stands (3,): the present row, nodes of the recording in use, and how the last step ended.
+"""The position of a held run (3,): the present row, nodes of the recording in use, and how the last step ended.
 
 Compiled code writes it, so that it is true whenever Python code runs, an interrupt's handler among it.
 """
@@ -148,7 +148,7 @@ def advance(
     starboard: float,
     seen: np.ndarray,
 ) -> int:
-    """Take some exchanges under one command, from a row that is written anew with that command.
+    """Take some exchanges under one command, from a row that is written again with that command.
 
     Args:
         handle: the run; its orders have one row.

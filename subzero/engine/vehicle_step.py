@@ -44,8 +44,8 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
             for i in range(STATE_SIZE):
                 stage[i] = state[i] + (part * k[s - 1, i] if s > 0 else 0.0)
             along = (n * h + part) / span
-            # The pull ends at the force that is sought, with a slope that is known: only so does the hull's answer to
-            # the guess stay linear, ∂x/∂F = (h²/2) A, and the exchange stable on a heavy cable (see `coupling`).
+            # The pull ends at the unknown force, with a slope that is known: only so is the hull's response to
+            # the guess linear, ∂x/∂F = (h²/2) A, and the exchange stable on a heavy cable (see `coupling`).
             for i in range(3):
                 work.pull[i] = now.guess[i] + (along - 1.0) * ratio * (now.force[i] - now.force_before[i])
             tow_wrench(stage, work.pull, setup.fixed.r_c, work)

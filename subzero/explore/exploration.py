@@ -1,8 +1,8 @@
 """What would a trial do if …? Sliders for its main numbers, the run of what they say, and the file of it.
 
-Nothing here knows a page: `subzero.explore.page` shows it. A slider is a value: which numbers of the trial it moves
-(`scenarios.parameters` has their names), its unit, and from where to where it goes. A run of a change is that of
-`Trial.with_changes`, and so is the file: read again, it is the same trial, to the last bit.
+The module is independent of the page: `subzero.explore.page` shows it. A slider is a value: which numbers of the
+trial it moves (`scenarios.parameters` has their names), its unit, and from where to where it goes. A run of a change
+is that of `Trial.with_changes`, and so is the file: read again, it is the same trial, to the last bit.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Values = Mapping[str, float]
 """Name of a slider → where it stands, in its unit; those that are left out stand where the trial has them."""
 
 Progress = Callable[[float], None]
-"""Told the fraction that is done."""
+"""Called with the fraction that is done."""
 
 ATTEMPT_S = 0.2
 """An answer is there within a second: so long for an attempt, as long to repeat it as far as it came, and the rest.
@@ -89,22 +89,22 @@ NUMBERS = (
     ("largest_cable_force_N", "largest cable force [N]", 4),
     ("largest_cable_moment_N_m", "largest cable moment [N m]", 4),
 )
-"""Numbers of a summary that are set beside the nominal ones: key, words, decimals."""
+"""Numbers of a summary that are compared with the nominal ones: key, words, decimals."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Slider:
-    """What one slider moves.
+    """The numbers that one slider moves.
 
     Args:
         name: of the first number that it moves.
-        words: what that is.
+        words: their name in words.
         unit: of it in files.
         low: where the slider ends at its left.
         high: at its right.
         nominal: where the trial has it; of a list, the value of largest size.
         shares: numbers of the trial → what they are of the slider's value: a list keeps its shape over time.
-        declared: what its file declares as plausible; None if it declares nothing.
+        declared: the range that its file declares as plausible; None if it declares none.
     """
 
     name: str
@@ -150,7 +150,7 @@ def sliders_of(trial: Trial) -> tuple[Slider, ...]:
 
 
 def _is_in_file(trial: Trial, name: str) -> bool:
-    """Say whether a number may stand in the file of a trial: not what a CSV file or a prescribed motion says."""
+    """Return whether a number may stand in the file of a trial: not what a CSV file or a prescribed motion says."""
     section, _, key = name.partition(".")
     if section == "start" and trial.motion is not None:
         return key in LEFT_OPEN and not (key == "depth_m" and trial.motion.depth is not None)
@@ -192,7 +192,7 @@ def _keys(trial: Trial, name: str) -> list[str]:
 
 
 def _allowed(trial: Trial, name: str, low: float, high: float) -> tuple[float, float]:
-    """Return a range without what the file would refuse."""
+    """Return a range without the values that the file would refuse."""
     row = quantity_of(trial, name)
     least, most = (row.low, row.high) if isinstance(row, Quantity) else row.get("limits", (low, high))
     return max(low, least), min(high, most)
@@ -203,12 +203,12 @@ def _allowed(trial: Trial, name: str, low: float, high: float) -> tuple[float, f
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """What came of some positions of the sliders.
+    """The result of some positions of the sliders.
 
     Args:
         values: the positions.
         run: the run; None where they were refused.
-        refusals: name of a slider → what is wrong with it, in the words of the reader of files; "" where it is no
+        refusals: name of a slider → its problem, in the words of the reader of files; "" where it has no
             slider of its own.
         seconds: how long it took. [s]
         rough: how the run is rough, in words; empty for the run that `subzero.simulate` gives.
@@ -256,17 +256,17 @@ class Exploration:
         }
 
     def answer(self, values: Values, progress: Progress = lambda fraction: None) -> Answer:
-        """Return the run of some positions of the sliders, or why there is none.
+        """Return the run of some positions of the sliders, or the reasons why there is none.
 
         Args:
             values: the positions.
-            progress: told the fraction that is done; what it raises ends the run.
+            progress: called with the fraction that is done; an exception that it raises ends the run.
         """
         *_, last = self.answers(values, progress)
         return last
 
     def answers(self, values: Values, progress: Progress = lambda fraction: None) -> Iterator[Answer]:
-        """Give a rough answer at once, and then that of `answer`, behind whatever refinement it takes.
+        """Yield a rough answer at once, and then that of `answer`, after any refinement it takes.
 
         The rough one is the run without refinement; where that takes longer than `ATTEMPT_S`, of the trial's first
         seconds.
@@ -310,7 +310,7 @@ class Exploration:
             return self.simulate(replace(plain, duration=steps * trial.cable_step), progress=progress)
 
     def _refusals(self, error: UserError) -> dict[str, str]:
-        """Return what is wrong, slider by slider."""
+        """Return the problems, slider by slider."""
         if not isinstance(error, ScenarioError):
             return {"": str(error)}
         owner = {key: slider.name for slider in self.sliders.values() for key in slider.shares}
@@ -327,7 +327,7 @@ class Exploration:
         return summarise(self.nominal)
 
     def numbers(self, summary: Mapping[str, Any]) -> list[tuple[str, str, str, str]]:
-        """Return rows of the table: words, nominal number, number, and what has changed.
+        """Return rows of the table: words, nominal number, number, and the change.
 
         Args:
             summary: of the run, by `subzero.results.summary.summarise`.
@@ -373,7 +373,7 @@ def _cells(nominal: float | None, changed: float | None, digits: int) -> tuple[s
 
 
 def text_with(trial: Trial, changes: Values, folder: Path) -> str:
-    """Return the text of the file of a trial with other numbers; its remarks stay.
+    """Return the text of the file of a trial with other numbers; its remarks are kept.
 
     Args:
         trial: as its file has it.
@@ -422,7 +422,7 @@ def _set_change(document: Any, name: str, value: float) -> None:
 
 
 def _lead_from(document: Any, old: Path, new: Path) -> None:
-    """Let the paths in a scenario file lead from another folder to the same files."""
+    """Make the paths in a scenario file lead from another folder to the same files."""
     places = [(document, "vehicle"), (document, "cable")]
     places += [(document[section], "file") for section in ("commands", "motion") if section in document]
     for table, key in places:
@@ -439,12 +439,12 @@ class NewerError(Exception):
 
 
 class Newest(Generic[Request, Found]):
-    """A thread that works on the newest request: one that waits is forgotten for it, one in work is given up.
+    """A thread that works on the newest request: a waiting request is dropped for it, a running one is abandoned.
 
     Args:
-        work: takes a request, and what it calls with the fraction that is done now and then; gives what is found.
-        done: takes what was found, in that thread.
-        failed: takes what a bug has raised, which is printed too.
+        work: takes a request, and a function to call with the fraction that is done now and then; returns the result.
+        done: takes the result, in that thread.
+        failed: takes an exception caused by a bug, which is printed too.
     """
 
     def __init__(
@@ -455,7 +455,7 @@ class Newest(Generic[Request, Found]):
     ) -> None:
         self._work, self._done, self._failed = work, done, failed
         self._waiting: list[Request] = []
-        self._begun = self._ended = False
+        self._started = self._ended = False
         self._news = threading.Condition()
 
     def ask(self, request: Request) -> None:
@@ -463,8 +463,8 @@ class Newest(Generic[Request, Found]):
         with self._news:
             self._waiting = [request]
             self._news.notify()
-            if not self._begun:  # a page that is only looked at needs no thread
-                self._begun = True
+            if not self._started:  # a page that is only looked at needs no thread
+                self._started = True
                 threading.Thread(target=self._go_on, daemon=True).start()
 
     def end(self) -> None:

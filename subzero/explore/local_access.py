@@ -1,4 +1,4 @@
-"""Let the owner's browser reach a page on this machine, and nothing else.
+"""Access to a page on this machine for the owner's browser, and for nothing else.
 
 Any program of this machine can open a port on it, and any site in the owner's browser can send requests there. So a
 random token stands in the address that is printed; the first visit with it leaves a cookie, without which nothing is
@@ -118,7 +118,7 @@ async def _refuse(scope: Message, send: Send, status: int, words: str) -> None:
 
 
 def _with(headers: tuple[tuple[bytes, bytes], ...], send: Send) -> Send:
-    """Return what sends an answer with headers added."""
+    """Return a function that sends an answer with headers added."""
 
     async def sent(message: Message) -> None:
         if message["type"] == "http.response.start":

@@ -2,9 +2,9 @@
 player, numbers.
 
 Every tab has its own positions of the sliders and its own thread, which runs the newest of them. The replay stands in
-a frame, which is loaded once and then takes other runs: camera and time stay where they are. Who may reach the page is
-`subzero.explore.local_access`. What a browser sends may be anything: it is checked where it comes in, `_position` and
-`_take`.
+a frame, which is loaded once and then takes other runs: camera and time do not change. The access to the page is
+limited by `subzero.explore.local_access`. A browser may send anything: it is checked where it comes in, `_position`
+and `_take`.
 
 Needs the extra ``[explore]``; NiceGUI takes a second to import, and is imported where a page is served.
 """
@@ -57,12 +57,12 @@ TITLES = {
     "drum": "Drum",
     "run": "Run",
 }
-"""Section of a trial → what stands above its sliders."""
+"""Section of a trial → the heading above its sliders."""
 
 
 @contextmanager
 def address(port: int) -> Iterator[tuple[Access, socket.socket]]:
-    """Give who may reach a page, with its address, and the socket that listens there, before anything is simulated.
+    """Yield the access rules of a page, with its address and the socket that listens there, before any simulation.
 
     Raises:
         UserError: what the page needs is not installed; the port cannot be had.
@@ -85,7 +85,9 @@ def address(port: int) -> Iterator[tuple[Access, socket.socket]]:
 
 @dataclass(frozen=True, kw_only=True)
 class Shown:
-    """What a tab shows of an answer: it, the summary of its run, and its replay as JSON; None where there is none."""
+    """The contents of a tab for an answer: it, the summary of its run, and its replay as JSON; None where there is
+    none.
+    """
 
     answer: Answer
     summary: dict[str, Any] | None
@@ -96,7 +98,7 @@ class Page:
     """The page of a trial.
 
     Args:
-        exploration: the trial, its run, and what runs others.
+        exploration: the trial, its run, and the function that runs others.
     """
 
     def __init__(self, exploration: Exploration) -> None:
@@ -161,7 +163,7 @@ class Page:
         )
 
     def replay(self, run: xr.Dataset) -> dict[str, Any] | None:
-        """Return the replay of a run beside the nominal one; None where there is nothing to see."""
+        """Return the replay of a run next to the nominal one; None where there is nothing to see."""
         from subzero.page import Actor, encode
 
         if run.sizes["time"] < 2 or self.exploration.nominal.sizes["time"] < 2:
@@ -178,11 +180,11 @@ class Page:
 
     @cached_property
     def as_in_file(self) -> Shown:
-        """What a tab shows at first."""
+        """The initial contents of a tab."""
         return self.shown(self.exploration.answer({}))
 
     def shown(self, answer: Answer) -> Shown:
-        """Return what a tab shows of an answer."""
+        """Return the contents of a tab for an answer."""
         from subzero.results.summary import summarise
 
         if answer.run is None:
@@ -198,7 +200,7 @@ class Page:
         """Fill a tab of the browser."""
         from nicegui import ui
 
-        while len(self.tabs) >= MOST_TABS:  # the oldest, of those that nobody looks at if there is one
+        while len(self.tabs) >= MOST_TABS:  # close the oldest, of those that are not in view if there are any
             tabs = self.tabs.values()
             min(tabs, key=lambda tab: tab.client.has_socket_connection).client.delete()
         name = uuid4().hex
@@ -212,7 +214,7 @@ class Page:
 
 
 class Tab:
-    """One tab of a browser: where its sliders stand, and what is shown.
+    """One tab of a browser: the positions of its sliders, and the run that is shown.
 
     Args:
         page: whose tab it is.
@@ -328,7 +330,7 @@ class Tab:
         self.newest.ask(dict(self.values))
 
     def save(self) -> None:
-        """Write a scenario file of the sliders into the working folder, and say what to do with it."""
+        """Write a scenario file of the sliders into the working folder, and show how to use it."""
         name = str(self.file.value or "")
         try:
             _check_name(name)
@@ -339,7 +341,7 @@ class Tab:
             self.saved.set_text(f"Wrote {name}. Run it: subzero simulate {shlex.quote(name)}")
 
     def show(self, shown: Shown) -> None:
-        """Show an answer: the run, its numbers and warnings; or what was refused, beside its slider."""
+        """Show an answer: the run, its numbers and warnings; or the refusals, next to their sliders."""
         answer = shown.answer
         for name, knob in self.knobs.items():
             knob.say(answer.refusals.get(name, ""))
@@ -384,7 +386,9 @@ class Tab:
 
 
 def _check_name(name: str) -> None:
-    """Refuse the name of a file that leads out of the working folder, or that a terminal or a command would obey."""
+    """Raise an error for a file name that leads out of the working folder, or that a terminal or a command would
+    obey.
+    """
     if set(name) & {"/", "\\"}:
         raise UserError(f"Give a name without folders: the file goes to {printable(str(Path.cwd()))}.")
     if not name.isprintable() or name.startswith("-"):
@@ -409,12 +413,12 @@ def _take(take: Callable[..., None], sender: str, *message: Any) -> None:
     """Take what a browser sends, unless it is no event at all."""
     with suppress(
         ValueError, TypeError, LookupError, AttributeError
-    ):  # errors in what it causes are caught inside
+    ):  # errors in its effects are caught inside
         take(sender, *message)
 
 
 def _position(event: Any) -> float | None:
-    """Return the number that a browser has sent; None for what is none."""
+    """Return the number that a browser has sent; None if it is not a number."""
     sent = event.args
     try:
         return real(float(sent)) if isinstance(sent, str) else real(sent)
@@ -431,11 +435,12 @@ def _cell(kind: str, text: str) -> Any:
 
 
 class Knob:
-    """One slider on the page: it, the number beside it that takes any value, and what is wrong with it.
+    """One slider on the page: the slider, a number field next to it that takes any value, and the problem with the
+    value.
 
     Args:
-        slider: what it moves.
-        moved: told its name and its position when somebody moves it.
+        slider: the parameter that it moves.
+        moved: called with its name and its position when a user moves it.
     """
 
     def __init__(self, slider: Slider, moved: Callable[[str, float], None]) -> None:
@@ -454,7 +459,8 @@ class Knob:
                     format=f"%.{DIGITS}g",
                     on_change=lambda event: self.turn(event.value),
                 )
-                self.number.on("blur", lambda: self.put(self._value))  # what was left empty is as it was
+                # An empty field gets the last value again.
+                self.number.on("blur", lambda: self.put(self._value))
                 self.number.props(
                     f'dense debounce=300 input-class=text-right aria-label="{slider.words}{unit}"'
                 )
@@ -466,7 +472,7 @@ class Knob:
                 on_change=lambda event: self.turn(event.value),
             ).props(f'aria-label="{slider.words}{unit}"')
             for element in (self.number, self.handle):
-                element._event_args_to_value = _position  # type: ignore[assignment, method-assign]  # NiceGUI's fail with what is none
+                element._event_args_to_value = _position  # type: ignore[assignment, method-assign]  # NiceGUI's fails on non-numbers
             ui.label(_range_words(slider)).classes("range")
             self.refused = ui.label().classes("refused")
         self.put(slider.nominal)
@@ -479,19 +485,19 @@ class Knob:
         self._moved(self.slider.name, value)
 
     def put(self, value: float) -> None:
-        """Stand at a value; the handle of one beyond the slider's ends stands at its end."""
-        self._value, self._is_put = value, True  # neither of the two has been moved by somebody
+        """Set the position; the handle of a value beyond the slider's ends is at its end."""
+        self._value, self._is_put = value, True  # set by the program, not moved by the user
         self.number.set_value(value)
         self.handle.set_value(min(max(value, self.slider.low), self.slider.high))
         self._is_put = False
         self.back.set_visibility(value != self.slider.nominal)
 
     def say(self, words: str) -> None:
-        """Say what is wrong with the value; nothing if nothing is."""
+        """Show the problem with the value; nothing if there is none."""
         self.refused.set_text(words)
 
 
 def _range_words(slider: Slider) -> str:
-    """Return where the trial has it, and what is plausible, in a few words."""
+    """Return the value of the trial, and the plausible range, in a few words."""
     plausible = "" if slider.declared is None else "; plausible {:g} … {:g}".format(*slider.declared)
     return f"{slider.low:g} … {slider.high:g}, in the file {slider.nominal:g}{plausible}"

@@ -47,7 +47,7 @@ def draw(runs: Runs | xr.Dataset, record: Record | None = None) -> dict[str, Fig
 
     Args:
         runs: one run; or ``{"tethered": ..., "untethered": ...}``, or one of the two.
-        record: what was measured, drawn as dots.
+        record: the measured record, drawn as dots.
 
     Raises:
         UserError: a dataset that is no run, or nothing.

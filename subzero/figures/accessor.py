@@ -39,7 +39,7 @@ RENAMED_TERMS = {"external": "cable"}
 """Term of the force breakdown in files of version 0.2 → its name today."""
 
 NEEDED = ("time", "surge_speed", "cable_tension", "cable_position", "force_breakdown")
-"""What every run has, and hardly another netCDF file."""
+"""Variables that every run has, and hardly another netCDF file."""
 LAYOUT = {
     "force_breakdown": ("f", ("time", "term", "component")),
     "cable_position": ("f", ("time", "node", "earth_axis")),
@@ -105,7 +105,7 @@ def _loaded(path: Path) -> xr.Dataset:
 
 
 def _check_layout(file: Any, name: str) -> None:
-    """Refuse a file without a run, and arrays that are not those of a run."""
+    """Raise an error for a file without a run, and for arrays that are not those of a run."""
     missing = [variable for variable in NEEDED if variable not in file.variables]
     if missing or "scenario" not in file.ncattrs():
         raise UserError(
@@ -123,7 +123,7 @@ def _check_layout(file: Any, name: str) -> None:
 
 
 def _check_values(run: xr.Dataset) -> None:
-    """Refuse times that are none and attributes of another kind; raise whatever reading them raises."""
+    """Raise an error for invalid times and attributes of another kind; errors of reading them are passed on."""
     times = run["time"].values
     if not (times.size and np.isfinite(times).all() and (np.diff(times) > 0.0).all()):
         raise DamagedError("its times do not rise")
@@ -152,7 +152,7 @@ def up_to_date(run: xr.Dataset) -> xr.Dataset:
 
 @xr.register_dataset_accessor("subzero")  # type: ignore[no-untyped-call]  # xarray's has no types
 class RunAccessor:
-    """What subzero can do with a run: ``run.subzero``.
+    """The methods of subzero for a run: ``run.subzero``.
 
     Args:
         run: a dataset of `subzero.simulate`.
@@ -168,7 +168,7 @@ class RunAccessor:
 
     @property
     def warnings(self) -> tuple[RunWarning, ...]:
-        """What may be wrong with the run; none is best."""
+        """The warnings about the run; none is best."""
         return tuple(warnings_of(self._run))
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -233,13 +233,13 @@ class RunPlots:
         return figure_6({label: self._run}, None, self._title())
 
     def forces(self) -> Figure:
-        """Return what acts on the vehicle, term by term, and where the propeller's work goes."""
+        """Return the figure of all forces on the vehicle, term by term, and of the propeller's work."""
         from subzero.figures import forces
 
         return forces(self._run, self._title())
 
     def attitude(self) -> Figure:
-        """Return attitude, depth and what the actuators do."""
+        """Return the figure of attitude, depth and actuators."""
         from subzero.figures import attitude
 
         label = "tethered" if self._run.attrs["tethered"] else "untethered"
@@ -300,7 +300,7 @@ def figures_of(run: xr.Dataset, what: Sequence[str] | None = None) -> dict[str, 
 
 
 PLOTS = ("tension", "shape3d", "motion", "forces", "attitude", "cable")
-"""Methods of `RunPlots`, and what ``subzero plot --what`` takes."""
+"""Methods of `RunPlots`, and the names that ``subzero plot --what`` takes."""
 
 UNTETHERED_PLOTS = tuple(name for name in PLOTS if name not in ("tension", "cable"))
 """Those that a run without a cable has."""

@@ -1,4 +1,4 @@
-"""The cable: where it lies, how it pulls along its length, and what it does to the vehicle.
+"""The cable: its shape, its tension along its length, and its force on the vehicle.
 
 `tension` shows the pull along the whole cable at all times, and between which values it has been (a range graph).
 `deployment` shows what a winch does, or a vessel that carries the drum: cable and distance, pay-out, tension, tracks.
@@ -42,7 +42,7 @@ ALONG, OVER = 240, 400
 """Points along the cable and times of an image of the tension, at most. [-]"""
 
 SHAPES = 5
-"""So many shapes tell how a cable grows, and can still be told apart."""
+"""So many shapes show how a cable grows, and can still be distinguished."""
 SIDE = 5.4
 """Width and height of a view in space. [inch]"""
 LETTERS_A_LINE = 64
@@ -161,7 +161,7 @@ def drum_direction(run: xr.Dataset) -> np.ndarray:
 
 
 def axes_of(run: xr.Dataset) -> tuple[str, str, str]:
-    """Return what the earth axes are called: counted from a drum that stands, or from where a vessel started."""
+    """Return the labels of the earth axes: counted from a drum that is at rest, or from the start of a vessel."""
     return MOVING if np.ptp(drum_direction(run), axis=0).max() > RESTING else AXES
 
 
@@ -172,7 +172,7 @@ def longest(run: xr.Dataset, *candidates: int) -> int:
 
 
 def in_scale(axes: Axes, *, stretch: bool = False) -> float:
-    """Show both directions in the same scale, by widening the one that has room to spare.
+    """Show both directions in the same scale, by widening the one that has space to spare.
 
     Args:
         axes: a view of the cable.
@@ -239,7 +239,7 @@ MARKS = 60.0
 
 
 def is_deployed(run: xr.Dataset) -> bool:
-    """Say whether a winch turns the drum or a vessel carries it."""
+    """Return whether a winch turns the drum or a vessel carries it."""
     reported = json.loads(run.attrs["parameters"])
     return any(reported.get(name) for name in ("winch", "vessel"))
 
@@ -288,7 +288,7 @@ def shape_3d(run: xr.Dataset, title: Title, count: int = SHAPES) -> Figure:
 
     Args:
         run: a run with a cable; of another, the track of the hull alone is drawn.
-        title: what stands above it.
+        title: the title above it.
         count: how many shapes, spread over the run.
     """
     figure = Figure(figsize=(SIDE, SIDE), dpi=style.DPI, facecolor="white")

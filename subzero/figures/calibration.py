@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 ROW = 0.2
 """Height of a row of a list of numbers. [inch]"""
 LEGEND = 0.75
-"""Room for the legend below the profiles. [inch]"""
+"""Height of the legend below the profiles. [inch]"""
 RISE_95 = 3.84
 """Rise of −2 log posterior at the ends of an interval of 95 %."""
 COLUMNS = 4
@@ -33,7 +33,7 @@ def draw_calibration(found: Calibration, title: Title) -> dict[str, Figure]:
 
 
 def numbers(found: Calibration, title: Title) -> Figure:
-    """Draw every number with its interval, as a share of what the file had; what was believed beforehand in grey."""
+    """Draw every number with its interval, as a share of the number in the file; the prior in grey."""
     figure, (axes,) = sheet(1, 1, title)
     height = TOP + 0.4 + BOTTOM + ROW * max(len(found.estimates), 4)
     _resize(figure, height, left=0.36)
@@ -76,7 +76,7 @@ def numbers(found: Calibration, title: Title) -> Figure:
 
 
 def _span(found: Calibration) -> tuple[float, float]:
-    """Return the range of the axis: all intervals, and some of what was believed beforehand."""
+    """Return the range of the axis: all intervals, and a part of the prior."""
     ends = [
         100.0 * (x - estimate.before) / (abs(estimate.before) or estimate.prior_sd)
         for estimate in found.estimates
@@ -117,7 +117,7 @@ def errors(found: Calibration, title: Title) -> Figure:
 
 
 def profiles(found: Calibration, title: Title) -> Figure:
-    """Draw how much worse the fit gets with each number held elsewhere, beside what its interval says."""
+    """Draw how much worse the fit gets with each number held at other values, and its interval."""
     columns = min(len(found.profiles), COLUMNS)
     figure, panels = sheet(math.ceil(len(found.profiles) / columns), columns, title)
     for axes, (name, each) in zip(panels, found.profiles.items(), strict=False):

@@ -89,7 +89,7 @@ FORMULA_LENGTH = 110
 
 
 def _what(unknown: Unknown) -> str:
-    """Return what is drawn in words: what it does, and which sign that has."""
+    """Return the label of a drawn effect: its force or drift, and the meaning of its sign."""
     if unknown.is_drift:
         return f"Drift of the {unknown.axis.replace('_', ' ')}'s sensor, that no cause explains; band: 95 %"
     does = something(unknown.axis, unknown.force)
@@ -138,7 +138,7 @@ def evidence(verdict: Verdict, title: Title) -> Figure | None:
 
 
 NAME_LENGTH, NARROW_NAME_LENGTH = 50, 36
-"""So many letters of an explanation fit beside its bar; in a narrow figure."""
+"""Number of letters of an explanation that fit next to its bar; in a narrow figure."""
 
 
 def _wrapped(words: str) -> str:
@@ -189,7 +189,7 @@ def detectable(verdict: Verdict, title: Title) -> Figure | None:
 
 
 def _short(words: str) -> str:
-    """Return as much of some words as fits beside a bar."""
+    """Return as many of the words as fit next to a bar."""
     most = 38 if style.width() >= style.ONE_COLUMN else 34
     return words if len(words) <= most else f"{words[: most - 1].rstrip()}…"
 
@@ -242,13 +242,13 @@ def _verdict_colour(discrimination: float) -> str:
 
 
 BAR_ROW, NARROW_LEFT = 0.17, 0.6
-"""Height of a bar with its space [inch]; where bars begin in a narrow figure, whose panels stand below one another."""
+"""Height of a bar with its space [inch]; start of bars in a narrow figure, whose panels are below one another."""
 
 
 def _bars(
     columns: int, rows: int, title: Title, *, left: float = 0.2, apart: float = 0.72
 ) -> tuple[Figure, list[Axes]]:
-    """Return a sheet for horizontal bars, as high as they need, with room for their names."""
+    """Return a sheet for horizontal bars, as high as they need, with space for their names."""
     from subzero.figures.style import BOTTOM, TITLE_LINE, TOP
 
     figure, panels = sheet(1, columns, title)
@@ -282,7 +282,7 @@ MODELS: dict[str, dict[str, Any]] = {
     "nominal": {"color": style.ORANGE, "linestyle": style.DASHES[1], "linewidth": 1.3},
     "extended": {"color": style.BLUE, "linestyle": style.DASHES[0], "linewidth": 1.4},
 }
-"""Models that are drawn over what was measured, the best one last."""
+"""Models that are drawn over the measurements, the best one last."""
 CALIBRATED = "tolerance"
 """The nominal model refitted within its tolerances, drawn where nothing is extended."""
 MODEL_WORDS = {
@@ -290,11 +290,11 @@ MODEL_WORDS = {
     "extended": "extended model",
     CALIBRATED: "calibrated within tolerances",
 }
-"""What the models are called wherever they are drawn."""
+"""Names of the models in all figures."""
 
 RIVAL = "rival: "
 BAND = 1.96
-"""The noise band holds 95 % of what a right model leaves."""
+"""The noise band holds 95 % of the residuals of a right model."""
 
 SMOOTH = 0.5
 """Residuals are shown as dots, and as a line smoothed over so long. [s]"""
@@ -323,14 +323,16 @@ def draw_diagnosis(verdict: Verdict, title: Title) -> dict[str, Figure]:
 
 
 class Drawn(NamedTuple):
-    """What is drawn of a record: its curves, the noise of its channels, and the verdict that they belong to."""
+    """The data of the figures of a record: its curves, the noise of its channels, and the verdict that they belong
+    to.
+    """
 
     curves: Curves
     noise: Mapping[str, Misfit]
     verdict: Verdict
 
     def words(self, model: str) -> str:
-        """Return what a model is called."""
+        """Return the name of a model."""
         if model in MODEL_WORDS and not (model == CALIBRATED and self._is_rival):
             return MODEL_WORDS[model]
         model = model.replace(CALIBRATED, "none")
@@ -354,7 +356,7 @@ class Drawn(NamedTuple):
 
     @property
     def _is_rival(self) -> bool:
-        """Whether "nothing is wrong", which the calibrated model stands for, is among what is left."""
+        """Whether "nothing is wrong", which the calibrated model represents, is among the remaining explanations."""
         return self.verdict.on_model == UNDECIDED and self._probability(CALIBRATED) >= WORTH_A_LINE
 
     def _probability(self, model: str) -> float:
@@ -367,7 +369,7 @@ class Drawn(NamedTuple):
 
     @staticmethod
     def _key(model: str) -> str:
-        """Return the explanation that a model stands for, as in `Verdict.probabilities`."""
+        """Return the explanation that a model represents, as in `Verdict.probabilities`."""
         return model.removeprefix(RIVAL).replace(CALIBRATED, "none")
 
     @property
@@ -377,7 +379,7 @@ class Drawn(NamedTuple):
 
     @property
     def shown(self) -> dict[str, dict[str, Any]]:
-        """The models that are drawn over what was measured, and how."""
+        """The models that are drawn over the measurements, and their styles."""
         looks = {"nominal": MODELS["nominal"], self.best: MODELS["extended"]}
         return {name: look for name, look in looks.items() if name in self.curves.models}
 
@@ -386,14 +388,14 @@ class Drawn(NamedTuple):
         return self.curves.used.get(channel, np.isfinite(self.curves.measured[channel]))
 
     def left(self, channel: str, model: str) -> np.ndarray:
-        """Return what a model leaves unexplained of the samples that were used."""
+        """Return the residuals of a model at the samples that were used."""
         residual = self.curves.measured[channel] - self.curves.models[model][channel]
         used: np.ndarray = residual[self.used(channel)]
         return used
 
 
 def misfit(drawn: Drawn, title: Title) -> Figure | None:
-    """Draw every channel: measured over models on the left, what they leave unexplained on the right."""
+    """Draw every channel: measured over models on the left, the residuals of the models on the right."""
     measured = drawn.curves.measured
     if not measured:
         return None
@@ -410,7 +412,7 @@ def misfit(drawn: Drawn, title: Title) -> Figure | None:
 
 
 def rivals(drawn: Drawn, title: Title) -> Figure | None:
-    """Draw what it would have looked like if a rival were true: what was measured would lie on the rival's line."""
+    """Draw the channels as if a rival were true: the measurements would then lie on the rival's line."""
     curves, best = drawn.curves, drawn.best
     names = [model for model in drawn.named if model in curves.models and model != best]
     if not names or not any(name.startswith(RIVAL) for name in (best, *names)):
@@ -418,7 +420,7 @@ def rivals(drawn: Drawn, title: Title) -> Figure | None:
     worst = sorted(curves.measured, key=lambda channel: -_apart(drawn, channel, names))[:6]
     figure, panels = sheet((len(worst) + 1) // 2, 2, title)
     for axes, channel in zip(panels, worst, strict=False):
-        _beside(axes, drawn, channel, names)
+        _draw_less_best(axes, drawn, channel, names)
         model = "extended model" if best == "extended" else "most probable"
         headline(axes, f"{BY_NAME[channel].name.replace('_', ' ').capitalize()} − {model}")
     legend(panels[0], columns=1)
@@ -436,8 +438,8 @@ def _apart(drawn: Drawn, channel: str, names: list[str]) -> float:
     return float(max(gaps)) / (noise.noise_sd if noise else 1.0)
 
 
-def _beside(axes: Axes, drawn: Drawn, channel: str, names: list[str]) -> None:
-    """Draw rivals and what was measured, smoothed, less the best model."""
+def _draw_less_best(axes: Axes, drawn: Drawn, channel: str, names: list[str]) -> None:
+    """Draw rival models and the smoothed measurements, each minus the best model."""
     curves, best = drawn.curves, drawn.best
     time = curves.time[drawn.used(channel)]
     _band(axes, drawn.noise.get(channel))
@@ -476,7 +478,7 @@ def _overlay(axes: Axes, drawn: Drawn, channel: str) -> None:
 
 
 def _recorded_wrong(curves: Curves, channel: str) -> np.ndarray:
-    """Return time and value of the samples that an error in the data befalls, as they were recorded (n, 2)."""
+    """Return recorded time and value of the samples that an error in the data affects (n, 2)."""
     time, values = curves.recorded.get(channel, (np.empty(0), np.empty(0)))
     right = set(zip(np.round(curves.time, 6), curves.measured[channel], strict=True))
     pairs = zip(np.round(time, 6), values, strict=True)
@@ -484,7 +486,7 @@ def _recorded_wrong(curves: Curves, channel: str) -> np.ndarray:
 
 
 def _residuals(axes: Axes, drawn: Drawn, channel: str) -> None:
-    """Draw measured − simulated of each model, smoothed, beside the noise of the sensor and the step of its values."""
+    """Draw measured − simulated of each model, smoothed, with the noise of the sensor and the step of its values."""
     time, noise = drawn.curves.time[drawn.used(channel)], drawn.noise.get(channel)
     _band(axes, noise)
     axes.axhline(0.0, color=style.GREY, linewidth=0.7)
@@ -501,14 +503,16 @@ def _residuals(axes: Axes, drawn: Drawn, channel: str) -> None:
 
 
 def _behind(noise: Misfit | None) -> str:
-    """Return what stands behind the residuals."""
+    """Return the words that explain the background of the residuals."""
     if noise is None:
         return ""
     return "; grey: noise, 95 %" + ("; dotted: step" if noise.resolution > 0.0 else "")
 
 
 def _show_noise(axes: Axes, drawn: Drawn, channel: str, noise: float, unit: str) -> None:
-    """Let the noise and what the best model leaves be seen, even where the nominal model is far off: then say so."""
+    """Limit the axis so that the noise and the residuals of the best model are visible; say so if the nominal one is
+    cut.
+    """
     best = np.abs(drawn.left(channel, drawn.best)) if drawn.best in drawn.curves.models else np.zeros(1)
     most = NOISE_SHARE * max(BAND * noise, float(best.max(initial=0.0)))
     nominal = drawn.curves.models.get("nominal")
@@ -548,7 +552,7 @@ def _smooth(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def _fit_to(axes: Axes, curves: list[np.ndarray]) -> None:
-    """Let outliers lie outside of the panel rather than flatten what matters."""
+    """Limit the axis so that outliers are outside of the panel and do not flatten the other values."""
     values = np.concatenate([curve[np.isfinite(curve)] for curve in curves])
     low, high = values.min(), values.max()
     margin = 0.08 * (high - low) or 1.0

@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 TERMS_SHOWN = 6
-"""The largest terms are drawn each, the others as their sum: more lines cannot be told apart."""
+"""The largest terms are drawn each, the others as their sum: more lines cannot be distinguished."""
 
 VISIBLE = 1e-3
-"""What never reaches this share of the largest is not worth a line."""
+"""A term that never reaches this share of the largest is not drawn."""
 
 CABLE, CABLE_COLOUR = "cable", style.GREEN
-"""The cable has one colour: what it does to the vehicle, and what it costs."""
+"""The cable has one colour: for its force on the vehicle, and for its energy."""
 
 COMPONENTS = {
     "X": ("Forward force by term", "$X$ [N]"),
@@ -77,7 +77,7 @@ def cable_forces(run: xr.Dataset, force: Axes, moment: Axes) -> None:
 
 
 def forces(run: xr.Dataset, title: Title) -> Figure:
-    """Draw what acts on the vehicle: the cable's force and moment, and every term in three components."""
+    """Draw the forces on the vehicle: the cable's force and moment, and every term in three components."""
     figure, panels = sheet(3, 2, title)
     cable_forces(run, panels[0], panels[1])
     components = _busiest(run)

@@ -1,4 +1,4 @@
-"""How the vehicle moves: the four panels of Fig. 6, and what its actuators and its attitude do."""
+"""The motion of the vehicle: the four panels of Fig. 6, its actuators and its attitude."""
 
 from __future__ import annotations
 
@@ -46,8 +46,8 @@ SEEN = 1e-3
 def figure_6(runs: Runs, record: Record | None, title: Title) -> Figure:
     """Draw Fig. 6 of Feng and Allen (2004): propeller command, forward speed, rudder command, heading.
 
-    Beside the command of the rudder stands where it is: what its servo makes of it, with feedback of its position or
-    without, which is what the paper names as the improvement.
+    The command of the rudder is drawn together with its angle: the response of its servo, with feedback of its
+    position or without, which is what the paper names as the improvement.
     """
     figure, panels = sheet(2, 2, title)
     propeller, speed, rudder, heading = panels
@@ -66,7 +66,7 @@ def figure_6(runs: Runs, record: Record | None, title: Title) -> Figure:
 
 
 def attitude(runs: Runs, record: Record | None, title: Title) -> Figure:
-    """Draw what the actuators do and how the hull answers: six panels."""
+    """Draw the actuators and the response of the hull: six panels."""
     figure, panels = sheet(3, 2, title)
     for axes, (name, words) in zip(panels, ATTITUDE.items(), strict=True):
         channel_panel(axes, runs, name, record)
@@ -107,7 +107,7 @@ def _starboard_plane(runs: Runs, axes: Axes) -> None:
 
 
 def _rudder(axes: Axes, runs: Runs, longest: xr.Dataset) -> None:
-    """Draw what the rudder is commanded, and where it is; a run in which it does the same has no line of its own."""
+    """Draw the rudder's command and its angle; a run in which they are the same has no line of its own."""
     _command(axes, longest, "rudder_command", r"$\delta_{rc}$, $\delta_r$ [degree]", label="commanded")
     drawn: list[np.ndarray] = []
     for which, run in runs.items():
@@ -120,13 +120,13 @@ def _rudder(axes: Axes, runs: Runs, longest: xr.Dataset) -> None:
 
 
 def _differ(a: np.ndarray, b: np.ndarray) -> bool:
-    """Say whether two angles can be told apart as long as both are known."""
+    """Return whether two angles can be distinguished in a figure as long as both are known."""
     both = min(a.size, b.size)
     return float(np.abs(a[:both] - b[:both]).max()) > SEEN
 
 
 def _feedback(run: xr.Dataset) -> str:
-    """Say whether the rudder's servo is told where the rudder is."""
+    """Return whether the rudder's servo has feedback of the rudder's position."""
     servo = json.loads(run.attrs["parameters"]).get("vehicle", {}).get("rudder_servo", {})
     return "with feedback" if servo.get("position_feedback", 0.0) > 0.0 else "without feedback"
 

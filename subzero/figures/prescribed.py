@@ -43,7 +43,9 @@ DOTS_SHOWN = 61
 
 
 def is_straight(run: xr.Dataset) -> bool:
-    """Say whether the run pulls a neutral cable straight off a free drum in still water: that has an exact solution."""
+    """Return whether the run pulls a neutral cable straight off a free drum in still water, which has an exact
+    solution.
+    """
     turns = max(float(np.ptp(run[name].values)) for name in ("pitch", "heading", "roll_angle"))
     slides = max(float(np.abs(run[name].values).max()) for name in ("sway_speed", "heave_speed"))
     reported = json.loads(run.attrs["parameters"])

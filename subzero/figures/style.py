@@ -41,7 +41,7 @@ Runs = dict[str, "xr.Dataset"]
 
 BLUE, ORANGE, GREEN, PURPLE, AMBER, SKY = "#0072B2", "#D55E00", "#009E73", "#AA4499", "#E69F00", "#56B4E9"
 INK, GREY, PALE = "#222222", "#8A8A8A", "#E3E3E3"
-"""Okabe and Ito's colours for all kinds of sight, purple after Tol; ink for text, grey for what is behind."""
+"""Okabe and Ito's colours for all kinds of sight, purple after Tol; ink for text, grey for the background."""
 
 TENSION = LinearSegmentedColormap.from_list(
     "tension", [(0.0, "#FFFACC"), (0.33, "#FFB833"), (0.7, "#F24721"), (1.0, "#C70547")]
@@ -89,10 +89,10 @@ NARROWEST, WIDEST = 3.0, 20.0
 """So wide may a figure be: 3.4 is one column of a journal page. [inch]"""
 
 ONE_COLUMN = 5.0
-"""A figure that is not as wide has panels that stand beside one another else below one another. [inch]"""
+"""In a figure that is narrower than this, panels that are otherwise side by side are below one another. [inch]"""
 
 LEFT, RIGHT = 0.72, 0.11
-"""Room to the left and to the right of the panels. [inch]"""
+"""Margins to the left and to the right of the panels. [inch]"""
 
 LETTERS_PER_INCH = 15.5
 """So many letters of a headline fit on an inch."""
@@ -112,7 +112,7 @@ LETTERS = 26
 
 @dataclass(frozen=True, kw_only=True)
 class Title:
-    """What stands above a figure: the trial in words, and the name of its scenario; and what warns of it, below."""
+    """The texts of a figure: above it the trial in words, and the name of its scenario; below it the warnings."""
 
     words: str
     scenario: str
@@ -129,9 +129,9 @@ def width() -> float:
 
 @contextmanager
 def page_width(inches: float) -> Iterator[None]:
-    """Let figures that are drawn inside be so wide: 7.2 for two columns of a journal page, 3.4 for one. [inch].
+    """Draw figures inside this block at a width: 7.2 for two columns of a journal page, 3.4 for one. [inch].
 
-    Text keeps its size; panels beside one another stand below one another where the page is narrow.
+    Text keeps its size; panels that are side by side are drawn below one another where the page is narrow.
 
     Raises:
         UserError: no page is as narrow, or as wide.
@@ -149,9 +149,9 @@ def page_width(inches: float) -> Iterator[None]:
 
 
 def _lines_of(title: Title) -> list[str]:
-    """Return the lines of a title, the first one beside the scenario's name."""
-    room = TITLE_LENGTH * (width() - LEFT) - len(title.scenario)
-    return textwrap.wrap(title.words, max(int(room), 12))[: MOST_TITLE_LINES + (width() < ONE_COLUMN)]
+    """Return the lines of a title; the scenario's name and the first one share a line."""
+    most_letters = TITLE_LENGTH * (width() - LEFT) - len(title.scenario)
+    return textwrap.wrap(title.words, max(int(most_letters), 12))[: MOST_TITLE_LINES + (width() < ONE_COLUMN)]
 
 
 def sheet(rows: int, columns: int, title: Title) -> tuple[Figure, list[Axes]]:
@@ -185,7 +185,7 @@ def sheet(rows: int, columns: int, title: Title) -> tuple[Figure, list[Axes]]:
 
 
 def _style(axes: Axes) -> None:
-    """Thin axes, a faint grid, ticks small enough to keep out of the way, no offset beside them (27.003, not 0.003)."""
+    """Draw thin axes, a faint grid, small ticks, and no offset at the axes (27.003, not 0.003)."""
     axes.grid(visible=True, color=PALE, linewidth=0.6)
     axes.set_axisbelow(True)
     axes.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10]))
@@ -209,10 +209,12 @@ def log_scale(axes: Axes) -> None:
 
 
 def headline(axes: Axes, text: str) -> None:
-    """Say in words what a panel shows, behind its letter."""
+    """Write the title of a panel after its letter."""
     letter = axes.get_title(loc="left")
-    room = LETTERS_PER_INCH * _inches(axes)[0]
-    lines = textwrap.wrap(f"{letter} {text}".strip(), max(int(room), 12)) if width() < ONE_COLUMN else []
+    most_letters = LETTERS_PER_INCH * _inches(axes)[0]
+    lines = (
+        textwrap.wrap(f"{letter} {text}".strip(), max(int(most_letters), 12)) if width() < ONE_COLUMN else []
+    )
     axes.set_title("\n".join(lines) or f"{letter} {text}".strip(), loc="left", fontsize=NORMAL, pad=3)
 
 
@@ -235,13 +237,13 @@ def _inches(axes: Axes) -> tuple[float, float]:
 
 
 def legend(axes: Axes, columns: int = 3, *, tight: bool = False, **where: Any) -> None:
-    """Show the legend, small; if no place is given, above the curves, where room is made for it.
+    """Show the legend, small; if no place is given, above the curves, where space is made for it.
 
     Args:
         axes: a panel with labelled curves.
         columns: at most; fewer where labels are long.
         tight: with smaller letters and shorter lines.
-        where: of matplotlib, in the place of all that.
+        where: of matplotlib, instead of all that.
     """
     size, handle = (TINY, 1.3) if tight else (SMALL, 2.0)
     if not where:
@@ -266,14 +268,14 @@ COLUMN_GAP, HANDLE_GAP = 0.9, 0.5
 
 def _columns(labels: list[str], most: int, across: float, size: float, handle: float) -> int:
     """Return into how many columns of a legend some labels fit; they fill one column after the other."""
-    beside = (handle + COLUMN_GAP + HANDLE_GAP) * size / 72.0
+    extra = (handle + COLUMN_GAP + HANDLE_GAP) * size / 72.0
     for columns in range(min(most, max(len(labels), 1)), 1, -1):
         rows = math.ceil(len(labels) / columns)
         parts = [labels[at : at + rows] for at in range(0, len(labels), rows)]
-        at_most = sum(max(map(len, part)) * WIDEST_LETTER * size / 72.0 + beside for part in parts)
+        at_most = sum(max(map(len, part)) * WIDEST_LETTER * size / 72.0 + extra for part in parts)
         if at_most <= across:
             return columns
-        if sum(max(_wide(each, size) for each in part) + beside for part in parts) <= across:
+        if sum(max(_wide(each, size) for each in part) + extra for part in parts) <= across:
             return columns
     return 1
 
@@ -289,7 +291,7 @@ def _wide(label: str, size: float) -> float:
 
 
 def channel_panel(axes: Axes, runs: Runs, name: str, record: Record | None = None) -> None:
-    """Draw one channel of all runs over time, and what was measured of it."""
+    """Draw one channel of all runs over time, and its measurements."""
     channel = BY_NAME[name]
     for run_name, run in runs.items():
         axes.plot(run["time"].values, run[name].values, label=run_name, **LINES[run_name])
@@ -301,7 +303,7 @@ def channel_panel(axes: Axes, runs: Runs, name: str, record: Record | None = Non
 
 
 def in_time(axes: Axes, runs: Runs) -> None:
-    """Let the time axis be the simulated time, whatever was measured besides."""
+    """Limit the time axis to the simulated time, also if the record is longer."""
     end = max(float(run["time"].values[-1]) for run in runs.values())
     axes.set_xlim(0.0, end if end > 0.0 else 1.0)
 
@@ -317,7 +319,7 @@ def calm(axes: Axes, smallest: float = 1e-6) -> None:
 
 
 def time_label(panels: list[Axes], columns: int) -> None:
-    """Name the time axis below the lowest row only; in a narrow figure, panels stand below one another."""
+    """Label the time axis below the lowest row only; in a narrow figure, panels are below one another."""
     columns = columns if width() >= ONE_COLUMN else 1
     for axes in panels[-columns:]:
         axes.set_xlabel("time [s]", fontsize=NORMAL, labelpad=2)

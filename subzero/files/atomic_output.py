@@ -67,11 +67,11 @@ class OutputFolder:
     failed: bool = False
 
     def files(self) -> dict[str, Any]:
-        """Return what was written where, ready for JSON."""
+        """Return the files written, by path, ready for JSON."""
         return {"folder": printable(str(self.folder)), "files": list(self.written)}
 
     def words(self) -> str:
-        """Return what was written where, in words."""
+        """Return the files written, by path, in words."""
         line = f"Wrote {printable(str(self.folder))}{os.sep}: {', '.join(self.written)}"
         if not (self.failed and self.folder.name == STOPPED):
             return line
@@ -106,7 +106,7 @@ def open_output_folder(folder: Path, names: Iterable[str] = ()) -> Iterator[Outp
 
 
 def state_of_output() -> str:
-    """Return what an interrupt that ended a command left behind, in words."""
+    """Return the files left behind by an interrupt that ended a command, in words."""
     if not _delivered:
         return "nothing was written"
     return f"all files were written to {printable(str(_delivered[-1]))}"
@@ -155,7 +155,7 @@ def _is_of_disk(error: OSError, folder: Path) -> bool:
 
 
 def _refuse_impossible(folder: Path) -> None:
-    """Refuse a path that cannot be a folder."""
+    """Raise an error for a path that cannot be a folder."""
     path = folder.absolute()
     try:
         str(path).encode("utf-8")
@@ -172,7 +172,7 @@ def _refuse_impossible(folder: Path) -> None:
 
 
 def _refuse_occupied(folder: Path, names: Iterable[str]) -> None:
-    """Refuse names that belong to something other than a file."""
+    """Raise an error for names that belong to something other than a file."""
     for name in names:
         with suppress(FileNotFoundError, NotADirectoryError):
             mode = os.lstat(folder / name).st_mode
@@ -185,7 +185,9 @@ def _refuse_occupied(folder: Path, names: Iterable[str]) -> None:
 
 @contextmanager
 def _temporary_folder(folder: Path) -> Iterator[Path]:
-    """Make a temporary folder in the output folder or its parent, which is made if need be; remove it at the end."""
+    """Make a temporary folder in the output folder or its parent, which is made if necessary; remove it at the
+    end.
+    """
     home = folder.absolute()
     home = home if home.is_dir() else home.parent
     parents = [path for path in (home, *home.parents) if not path.exists()]
@@ -287,12 +289,12 @@ def _list_incomplete(folder: Path, made: Path, names: Set[str]) -> None:
 
 
 def _replaces_good_result(folder: Path, names: list[str]) -> bool:
-    """Say whether files of these names in a folder are of a run that is not known to have failed."""
+    """Return whether files of these names in a folder are of a run that is not known to have failed."""
     return any(os.path.lexists(folder / name) for name in names) and not _is_failure(folder, names)
 
 
 def _is_failure(folder: Path, names: list[str]) -> bool:
-    """Say whether the summary in a folder that one of these files would replace calls itself a failure."""
+    """Return whether the summary in a folder that one of these files would replace calls itself a failure."""
     for name in {"summary.json", "diagnosis.json"} & set(names):
         with suppress(UserError, ValueError, RecursionError):
             found = json.loads(read_bytes(folder / name, MOST_OF_AN_ANSWER * 16))

@@ -33,7 +33,7 @@ class DamagedError(Exception):
 
 
 def append_digest(path: Path) -> None:
-    """Write the digest of a file behind its end."""
+    """Write the digest of a file after its end."""
     with open(path, "r+b") as file:
         digest = hashlib.file_digest(file, "sha256").digest()
         file.write(MARK + digest)
@@ -52,7 +52,7 @@ def without_digest(data: bytes) -> bytes:
 
 
 def check_digest(path: Path) -> None:
-    """Refuse an HDF5 file that was damaged, before its library opens it; one without a digest passes.
+    """Raise an error for an HDF5 file that was damaged, before its library opens it; one without a digest passes.
 
     Raises:
         DamagedError: its digest is that of other bytes, or what stands behind its end is no digest.
@@ -84,7 +84,7 @@ def _end(head: bytes) -> int | None:
 def check_arrays(
     arrays: Mapping[str, Any], expected: Mapping[str, tuple[str | np.dtype, tuple[Any, ...]]]
 ) -> None:
-    """Refuse arrays of another kind or shape than expected, before any is read.
+    """Raise an error for arrays of another kind or shape than expected, before any is read.
 
     Args:
         arrays: name → something with ``dtype`` and ``shape`` (or, for labelled ones, ``dimensions``).

@@ -29,7 +29,7 @@ MOST_OF_AN_ANSWER = MEGABYTE
 """A sealed answer has 2 kB, and 8 kB unpacked. [byte]"""
 
 MOST_OF_A_PROGRAM = MEGABYTE
-"""Nobody writes an autopilot or a list of effects of a thousand pages. [byte]"""
+"""No autopilot or list of effects has a thousand pages. [byte]"""
 
 MOST_COLUMNS = 1000
 """Of a table; a run has fifty channels. Of every unknown column the nearest known one is looked for."""
@@ -42,8 +42,8 @@ class UnreadableFileError(UserError):
     """A file that cannot be read.
 
     Attributes:
-        why: what is wrong with it, the end of a sentence.
-        remedy: what to do, a sentence.
+        why: the problem with it, the end of a sentence.
+        remedy: the remedy, a sentence.
         is_missing: there is none.
     """
 
@@ -72,7 +72,7 @@ def read_text(path: str | Path, most: int) -> str:
 
 
 def read_bytes(path: str | Path, most: int) -> bytes:
-    """Return what is in a plain file of at most `most` bytes.
+    """Return the contents of a plain file of at most `most` bytes.
 
     Raises:
         UnreadableFileError: as `read_text`.
@@ -85,7 +85,7 @@ def read_bytes(path: str | Path, most: int) -> bytes:
 
 
 def check_readable(path: str | Path) -> None:
-    """Refuse a file that cannot be read, for formats that a library opens itself.
+    """Raise an error for a file that cannot be read, for formats that a library opens itself.
 
     Raises:
         UnreadableFileError: as `read_text`; of any size.
@@ -131,7 +131,7 @@ def _first_bytes(path: Path, count: int) -> bytes | None:
 
 
 def _refuse_half_written(path: Path) -> None:
-    """Refuse a result whose folder holds files of two runs."""
+    """Raise an error for a result whose folder holds files of two runs."""
     if path.name in interrupted_files(path.parent):
         why = f"a command was killed while it wrote {printable(str(path.parent))}: its files are of two runs"
         remedy = (
@@ -142,7 +142,9 @@ def _refuse_half_written(path: Path) -> None:
 
 
 def interrupted_files(folder: Path) -> frozenset[str]:
-    """Return the names of the results in a folder that are old or new, nobody knows which; none if all is well."""
+    """Return the names of the results in a folder that may be old or new after an interruption; none if all is
+    well.
+    """
     marker = folder / INCOMPLETE
     if not os.path.lexists(marker):
         return frozenset()

@@ -20,7 +20,7 @@ from subzero.errors import printable
 MOST_LINES = 12
 """An overview has no more lines than this, its title among them."""
 MOST_LETTERS = 100
-"""A title or a cell is cut behind so many letters."""
+"""A title or a cell is cut after so many letters."""
 
 
 class Overview(NamedTuple):
@@ -39,7 +39,7 @@ class Overview(NamedTuple):
         return "\n".join([cut(self.title), *(f"  {line.rstrip()}" for line in lines)])
 
     def html(self) -> str:
-        """Return it as a table in which whatever stands in a title or a cell is text."""
+        """Return it as a table in which titles and cells are plain text."""
         rows = "".join(
             f"<tr><th style='text-align:left'>{escape(cut(name))}</th>"
             + "".join(f"<td style='text-align:left'>{escape(cut(cell))}</td>" for cell in cells)
@@ -49,7 +49,7 @@ class Overview(NamedTuple):
         return f"<div><strong>{escape(cut(self.title))}</strong><table>{rows}</table></div>"
 
     def _shown(self) -> Sequence[tuple[str, ...]]:
-        """Return the rows that there is room for, and how many more there are."""
+        """Return the rows that fit, and how many more there are."""
         if len(self.rows) < MOST_LINES:
             return self.rows
         kept = self.rows[: MOST_LINES - 2]
@@ -57,6 +57,6 @@ class Overview(NamedTuple):
 
 
 def cut(text: str) -> str:
-    """Return a text on one line, without what a terminal would obey, at most `MOST_LETTERS` letters."""
+    """Return a text on one line, without control characters of a terminal, at most `MOST_LETTERS` letters."""
     line = printable(" ".join(text.split()))
     return line if len(line) <= MOST_LETTERS else f"{line[: MOST_LETTERS - 1]}…"

@@ -4,8 +4,8 @@ Both logs are put on one grid, and for every lag τ at which they overlap by hal
 
     ρ(τ) = Σ cov(x, y; τ) / √(Σ var(x; τ) · Σ var(y; τ)),   sums over the channels, each in units of its deviation
 
-so that no bias of a sensor counts. The offset of the clocks is where ρ is largest, by a parabola through what is near,
-with the Cramér-Rao bound of a delay, σ² = (1 − ρ²) / (N · |ρ″|). Left out: clocks that drift.
+so that no bias of a sensor counts. The offset of the clocks is where ρ is largest, by a parabola through nearby
+values, with the Cramér-Rao bound of a delay, σ² = (1 − ρ²) / (N · |ρ″|). Left out: clocks that drift.
 """
 
 from __future__ import annotations
@@ -62,7 +62,9 @@ def _samples(record: Record, name: str, shift: float) -> Iterator[Sample]:
 
 
 def offset(first: Record, second: Record) -> tuple[float, float, list[str]]:
-    """Return what is added to the second log's times, its standard deviation [s], and the channels that say so."""
+    """Return the offset to add to the second log's times, its standard deviation [s], and the channels that determine
+    it.
+    """
     shared = [name for name in first.values if name in second.values]
     step = max(float(np.median(np.diff(record.time))) for record in (first, second))
     pairs = [pair for name in shared if (pair := _on_grid(name, first, second, step))]
@@ -105,7 +107,7 @@ def _on_grid(name: str, first: Record, second: Record, step: float) -> tuple[np.
 
 
 def _correlation(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return lags of the second behind the first [steps], the correlation there, and the points that overlap."""
+    """Return lags of the second after the first [steps], the correlation there, and the points that overlap."""
     n, m = (max(len(pair[k]) for pair in pairs) for k in (0, 1))
     lags = np.arange(-(m - 1), n)
     cov = np.zeros((3, lags.size))

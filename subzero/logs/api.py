@@ -1,4 +1,4 @@
-"""From a log to a checked record: read, map, convert, say what was done.
+"""From a log to a checked record: read, map, convert, report the steps.
 
 No value is changed without a line about it: `Imported.table` has one for each column, and the notes of the record name
 what was left out, shifted, or not decided by the values.
@@ -85,7 +85,7 @@ def read_log(path: str | Path, map: str | Path | None = None) -> Record:
 
 
 def undecided(found: Imported) -> UserError:
-    """Return the error that asks what names and values of a log do not decide."""
+    """Return the error that asks for the decisions which names and values of a log leave open."""
     questions = found.mapping.questions
     remedy = f"write the map with subzero import {found.source} --map-out map.toml, edit it, and give it with --map"
     title = f"The log {found.source} cannot be imported before this is decided:"
@@ -133,7 +133,7 @@ def import_log(
 
 
 def _rows(path: str | Path, table: Table, clock: Clock) -> tuple[np.ndarray, np.ndarray, list[str]]:
-    """Return the rows that are used, in the order of time, their times from t = 0 on [s], and what was done."""
+    """Return the rows that are used, in the order of time, their times from t = 0 on [s], and notes on both."""
     size = next(iter(table.columns.values())).values.size
     if not clock.columns:
         notes = [f"Times: a row every {clock.every_s:g} s, by the map."]
@@ -195,7 +195,7 @@ def _from_start(
 
 
 def _values(table: Table, mapping: Map, rows: np.ndarray) -> tuple[dict[str, np.ndarray], list[str]]:
-    """Return channel → values in its unit, and what was made of places and pressures."""
+    """Return channel → values in its unit, and notes on positions and pressures."""
     lines = {line.channel: line for line in mapping.lines if line.channel}
     values, notes = dict[str, np.ndarray](), list[str]()
     for channel, line in lines.items():

@@ -1,4 +1,4 @@
-"""What the values of a log say of the units of its columns, taken together.
+"""The evidence that the values of a log give for the units of its columns, taken together.
 
 Measurements of one vehicle are tied to one another. Over windows of rows, with a bar for the mean in a window,
 
@@ -84,7 +84,9 @@ class Contradiction(NamedTuple):
 
 
 class Findings(NamedTuple):
-    """What the values say: the units left of each channel, the ties that it agrees with, and the contradictions."""
+    """The evidence in the values: the units left of each channel, the ties that it agrees with, and the
+    contradictions.
+    """
 
     units: Mapping[str, list[str]]
     agrees: Mapping[str, list[str]]
@@ -117,7 +119,7 @@ class _Slope(NamedTuple):
 
 
 def findings(columns: Mapping[str, Measured], time: np.ndarray) -> Findings:
-    """Return what the values of all columns together say of each.
+    """Return the evidence of the values of all columns together, for each.
 
     Args:
         columns: channel → column.
@@ -141,7 +143,7 @@ def findings(columns: Mapping[str, Measured], time: np.ndarray) -> Findings:
 
 
 def tied(channel: str, columns: Mapping[str, Measured], time: np.ndarray) -> bool:
-    """Say whether a channel is as good as proportional to what others measure of its changes."""
+    """Return whether a channel is nearly proportional to the measure that other channels give of its changes."""
     return any(_slope(tie, columns, time) for tie in TIES if tie.left == channel)
 
 
@@ -153,7 +155,7 @@ def units_by_size(channel: str, values: np.ndarray) -> list[str]:
 
 
 def _is_possible(channel: str, name: str, known: np.ndarray, unit: Unit) -> bool:
-    """Say whether numbers in a unit lie where the channel can be."""
+    """Return whether numbers in a unit are in the possible range of the channel."""
     most, size = LIMITS.get(kind_of(channel), math.inf), np.abs(known).max(initial=0.0)
     if name == "ddmm.mmmm":  # degrees are shorter than that, but near the meridian
         is_long = size > most or channel == LONGITUDE
@@ -192,7 +194,9 @@ def _possible(columns: Mapping[str, Measured], variables: Mapping[str, str]) -> 
 
 
 def _counts_turns(column: Measured) -> bool:
-    """Say whether a column is a heading that its name has in radians or degrees, and that counts on over some turns."""
+    """Return whether a column is a heading that its name has in radians or degrees, and that counts on over some
+    turns.
+    """
     turn = {"rad": 2.0 * math.pi, "degree": 360.0}.get(column.unit, 0.0) * (column.channel == "heading")
     return bool(np.nanmax(np.abs(column.values)) <= MOST_TURNS * turn)
 
@@ -286,7 +290,7 @@ def _contradiction(
     possible: Mapping[str, list[str]],
     variables: Mapping[str, str],
 ) -> Contradiction:
-    """Return what stated units break, and which one of them alone could be another one."""
+    """Return the ties that stated units break, and which one of them alone could be another one."""
     repairs = tuple(
         (channel, unit)
         for channel in slope.channels

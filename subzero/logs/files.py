@@ -354,4 +354,4 @@ READERS: dict[str, Reader] = {
     ".bag": _by_library("ROS bag", "rosbags", "Copy it anew.", _rosbag),
     ".db3": _by_library("ROS bag", "rosbags", "Copy it anew.", _rosbag),
 }
-"""Ending of a file's name → what reads it."""
+"""Ending of a file's name → its reader."""

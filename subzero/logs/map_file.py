@@ -69,7 +69,7 @@ def _text(value: object) -> str:
 
 
 def map_content(path: str | Path) -> tuple[dict[str, Any], frozenset[str]]:
-    """Return what a map says, and the columns of the log that it names.
+    """Return the contents of a map, and the columns of the log that it names.
 
     Raises:
         UserError: it cannot be read, or is no map.
@@ -127,7 +127,7 @@ def _keys(where: str, entry: object, allowed: Mapping[str, Any]) -> list[str]:
 
 
 def _is(value: object, kinds: Any) -> bool:
-    """Say whether a value is of some kinds: a finite number, a truth value only where that is asked for."""
+    """Return whether a value is of some kinds: a finite number, a truth value only where that is asked for."""
     if isinstance(value, bool) or kinds is bool:
         return isinstance(value, bool) and kinds is bool
     return isinstance(value, kinds) and (isinstance(value, str | list | dict) or real(value) is not None)
@@ -158,7 +158,7 @@ def _read_clock(entry: dict[str, Any], table: Table, problems: list[str]) -> Clo
 
 
 def _problems_of_line(name: str, entry: Any, table: Table) -> list[str]:
-    """Return what is wrong with the line of one column."""
+    """Return the problems of the line of one column."""
     wrong, column = _keys(short(name), entry, COLUMN_KEYS), table.columns.get(name)
     if not wrong and not {"channel", "unit"} <= set(entry):
         wrong = [f"{short(name)} needs channel and unit"]

@@ -83,7 +83,7 @@ class Clock:
 
 @dataclass(frozen=True, kw_only=True)
 class Map:
-    """How a log becomes a record, what the user has to decide first, and what is odd about it, in sentences."""
+    """How a log becomes a record, the decisions that the user has to make first, and its anomalies, in sentences."""
 
     clock: Clock
     lines: tuple[Line, ...] = ()
@@ -92,7 +92,7 @@ class Map:
 
 
 def find_clock(table: Table) -> tuple[Clock, tuple[str, ...]]:
-    """Return how the times of a log are read, by names and forms of its columns, and what has to be asked.
+    """Return how the times of a log are read, by names and forms of its columns, and the questions to ask.
 
     Raises:
         UserError: there is no time.
@@ -120,13 +120,15 @@ def find_clock(table: Table) -> tuple[Clock, tuple[str, ...]]:
 
 
 def _is_time(table: Table, name: str) -> Named | None:
-    """Return what is said of a column of numbers that is a time by its name."""
+    """Return the finding for a column of numbers that is a time by its name."""
     found, column = recognised(name, table.columns[name].unit), table.columns[name]
     return found if found and found.channel == TIME.name and np.isfinite(column.values).any() else None
 
 
 def _are_fractions(table: Table, name: str, other: str) -> bool:
-    """Say whether the fractions of a clock in whole seconds stand in another column, as its name and numbers say."""
+    """Return whether the fractions of a clock in whole seconds stand in another column, as its name and numbers
+    say.
+    """
     both = [
         column.values[np.isfinite(column.values)] for column in (table.columns[name], table.columns[other])
     ]
@@ -157,7 +159,7 @@ def _clock_of_numbers(name: str, values: np.ndarray, written: str) -> tuple[Cloc
 
 
 def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> Map:
-    """Return what every column of a log is, by names and values.
+    """Return the meaning of every column of a log, by names and values.
 
     Args:
         table: the log.
@@ -201,7 +203,7 @@ def find_map(table: Table, clock: Clock, rows: np.ndarray, time: np.ndarray) -> 
 
 
 def contradictions(mapping: Map, table: Table, rows: np.ndarray, time: np.ndarray) -> tuple[str, ...]:
-    """Return what the values say against a map that was given, in sentences; its word holds all the same."""
+    """Return how the values contradict a map that was given, in sentences; the map is used nevertheless."""
     lines = {line.channel: line for line in mapping.lines if line.channel}
     values = {channel: line.factor * table.columns[line.name].values[rows] for channel, line in lines.items()}
     columns = {channel: Measured(channel, values[channel], line.unit) for channel, line in lines.items()}
@@ -236,7 +238,7 @@ def _line(name: str, named: Named, found: Findings, choice: str) -> Line:
 
 
 def _question(line: Line, found: Findings) -> str:
-    """Return what is asked about a column whose unit is not decided."""
+    """Return the question about a column whose unit is not decided."""
     units = _either(found.units[line.channel]) or "no unit that is known"
     if line.is_open:
         return f"{short(line.name)} ({line.channel}): its numbers cannot be in the unit of its name; {units} would do"
@@ -261,7 +263,7 @@ def _either(words: Sequence[str]) -> str:
 def _chosen(
     named: Mapping[str, Named], values: Mapping[str, np.ndarray], time: np.ndarray
 ) -> tuple[dict[str, str], list[str]]:
-    """Return why each column is chosen among those of its channel, or "not used: …"; and what has to be asked."""
+    """Return why each column is chosen among those of its channel, or "not used: …"; and the questions to ask."""
     ranks = {name: (found.channel in TARGETS, found.rank) for name, found in named.items()}
     by_target: dict[str, list[str]] = {}
     for name in sorted(named, key=lambda name: ranks[name]):
@@ -300,7 +302,7 @@ def _best_of(
 
 
 def _are_alike(first: np.ndarray, second: np.ndarray) -> bool:
-    """Say whether two columns change alike, by as much."""
+    """Return whether two columns change alike, by as much."""
     known = np.isfinite(first) & np.isfinite(second)
     if not known.any():
         return False

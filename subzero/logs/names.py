@@ -1,4 +1,4 @@
-"""What the name of a column says: its channel and its unit, looked up in the tables of ``names.toml``.
+"""The meaning of the name of a column: its channel and its unit, looked up in the tables of ``names.toml``.
 
 A name is cut into words, ``NAV_HEADING`` → nav heading, ``depth[cm]`` → depth in cm, ``yaw_rad`` → yaw in rad. Words of
 a message or a sensor before it, and numbers of instances, do not count. Only whole names of the table are recognised:
@@ -16,7 +16,7 @@ from subzero.channels import BY_NAME
 
 LATITUDE, LONGITUDE, PRESSURE = "latitude", "longitude", "pressure"
 TARGETS = {LATITUDE: "north", LONGITUDE: "east", PRESSURE: "depth"}
-"""What is no channel itself → the channel that it becomes."""
+"""A quantity that is no channel itself → the channel that it becomes."""
 RARE = ("mm", "km", "mm/s", "mrad", "mrad/s", "psi", "dbar absolute", "bar absolute", "psi absolute")
 """Units that are only believed where a name says so."""
 BRACKET = r"[\[(]([^\])]*)[\])]?"
@@ -24,7 +24,7 @@ BRACKET = r"[\[(]([^\])]*)[\])]?"
 
 
 class Unit(NamedTuple):
-    """A unit that loggers use: what is written times `factor`, plus `offset`, is in the channel's unit."""
+    """A unit that loggers use: a written value times `factor`, plus `offset`, is in the channel's unit."""
 
     factor: float
     offset: float = 0.0
@@ -32,7 +32,9 @@ class Unit(NamedTuple):
 
 
 class Named(NamedTuple):
-    """What a name says: channel, unit (empty: nothing), why, and its rank; a lower one is the better measurement."""
+    """The meaning of a name: channel, unit (empty: nothing), why, and its rank; a lower one is the better
+    measurement.
+    """
 
     channel: str
     unit: str
@@ -46,7 +48,7 @@ def kind_of(channel: str) -> str:
 
 
 def is_unit(text: str) -> bool:
-    """Say whether a text is a unit that is known."""
+    """Return whether a text is a known unit."""
     return any(_spelling(text) == spelling for _, spelling in SPELLINGS) or text in ("-", "1", "%")
 
 
@@ -61,7 +63,8 @@ def reason_unused(name: str) -> str:
 
 
 def recognised(name: str, unit: str = "") -> Named | None:
-    """Return what the name of a column, and the unit that the file has for it, say; None if no channel and no time.
+    """Return the meaning of a column's name, and of the unit that the file has for it; None if no channel and no
+    time.
 
     Args:
         name: as the logger wrote it.

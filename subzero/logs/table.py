@@ -1,7 +1,7 @@
 """A table of numbers from a log: columns of one length, with the units that the file writes; and the error for none.
 
 Every cell is a number. Dates and times of day are seconds, a text is a gap, and a column knows which of them it holds
-(`Column.form`). Which column is what is not decided here (`logs.names`), and no unit is converted.
+(`Column.form`). The meaning of a column is not decided here (`logs.names`), and no unit is converted.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Column:
     Args:
         values: numbers, or seconds of dates and times; NaN in gaps, and in all rows if it is not wanted. Shape (rows,).
         unit: as the file writes it, empty if it does not.
-        form: what its cells are: "number", "text", or a form of `logs.times`.
+        form: the form of its cells: "number", "text", or a form of `logs.times`.
     """
 
     values: np.ndarray
@@ -47,17 +47,17 @@ class Column:
 
     @property
     def is_empty(self) -> bool:
-        """Say whether it holds no value."""
+        """Return whether it holds no value."""
         return not np.isfinite(self.values).any()
 
 
 class Table(NamedTuple):
-    """What a log holds.
+    """The contents of a log.
 
     Args:
         source: the file, as the user named it.
         columns: name → column; all of one length.
-        notes: what was left out in reading, in sentences.
+        notes: rows and columns that were left out in reading, in sentences.
         stride: of so many rows of the file one is kept.
     """
 

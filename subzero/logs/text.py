@@ -41,11 +41,11 @@ GAPS = frozenset(
 )
 """Cells that hold no measurement, in small letters."""
 HEMISPHERE, SIGNS = "hemisphere", {"N": 1.0, "E": 1.0, "S": -1.0, "W": -1.0}
-"""Form of letters behind latitudes and longitudes, and their signs."""
+"""Form of letters after latitudes and longitudes, and their signs."""
 HEAD, LONGEST_LINE, CHUNK = 1 << 16, 1 << 20, 20_000
-"""What is looked at first [byte], the longest line [character], and rows that are converted at once."""
+"""The size of the first look [byte], the longest line [character], and rows that are converted at once."""
 SAMPLE = 100
-"""Lines that tell delimiter, decimal sign and header."""
+"""Number of lines that determine delimiter, decimal sign and header."""
 MOST_ROWS = 1_000_000
 """Of more rows only every n-th is kept: a record of ten channels then has about as much text as is read of one."""
 REMARKS = ("#", "%", "//")
@@ -97,7 +97,7 @@ def _is_kept(column: Column, layout: _Layout, at: int, wanted: Wanted) -> bool:
 
 
 def _hold_stride(path: Path, columns: Sequence[np.ndarray], stride: int) -> None:
-    """Refuse to leave rows out where that loses a sensor: rows that hold the sensors in turn."""
+    """Raise an error where leaving rows out would lose a sensor: rows that hold the sensors in turn."""
     known = [np.isfinite(values) for values in columns]
     if any(2.0 * is_known[::stride].mean() < is_known.mean() for is_known in known):
         why = f"it has more than {MOST_ROWS} rows, which hold sensors in turn"
@@ -181,7 +181,9 @@ def _width(rows: Sequence[Sequence[str]]) -> int:
 
 
 def _fit(lines: list[str], delimiter: str, decimal: str) -> tuple[bool, float, int]:
-    """Say how well a delimiter and a decimal sign suit some lines: the share of cells that are values in full rows."""
+    """Return how well a delimiter and a decimal sign suit some lines: the share of cells that are values in full
+    rows.
+    """
     rows = [_cells(line, delimiter) for line in lines]
     width = _width(rows)
     full = [row for row in rows if len(row) == width]
@@ -194,7 +196,7 @@ def _has_numbers(row: Sequence[str], decimal: str) -> bool:
 
 
 def _are_units(row: Sequence[str], decimal: str) -> bool:
-    """Say whether a row holds units: no numbers, and most of its cells are known."""
+    """Return whether a row holds units: no numbers, and most of its cells are known."""
     written = [cell for cell in row if cell]
     return bool(written) and not _has_numbers(row, decimal) and 2 * sum(map(is_unit, written)) > len(written)
 
@@ -291,7 +293,7 @@ def _joined(path: Path, name: str, parts: list[Column], values: np.ndarray | Non
 
 
 def _with_hemispheres(columns: dict[str, Column]) -> list[str]:
-    """Give latitudes and longitudes the signs of the letters in the column behind them, and say so."""
+    """Give latitudes and longitudes the signs of the letters in the column after them, and note it."""
     notes = []
     for name, letters in itertools.pairwise(columns):
         if columns[letters].form != HEMISPHERE:

@@ -30,10 +30,11 @@ DAYS = (4e4, 6e4), (7e5, 8e5)
 """Between these lie the days that Excel counts from 1900, and MATLAB from year 0, in this century."""
 
 STEP_LIMITS_S = 5e-3, 5.0
-"""Between these lie the steps of logs, less than a factor of 1000 apart, so that a step tells s, ms, us and ns. [s]"""
+"""Between these lie the steps of logs, less than a factor of 1000 apart, so that a step identifies s, ms, us or ns.
+[s]"""
 
 DAY_FIRST, MONTH_FIRST, EITHER, BOTH = ", day first", ", month first", ", day or month first", ", both orders"
-"""What is added to the form of dates with slashes until the whole column says which number is the day."""
+"""Ending of the form of dates with slashes until the whole column shows which number is the day."""
 
 _CLOCK = re.compile(r"(?:(\d+) days?,? )?(\d{1,3}):(\d\d)(?::(\d\d(?:[.,]\d*)?))? ?([AP]M)?$")
 _DATE = re.compile(
@@ -107,7 +108,8 @@ def form_of(forms: Counter[str]) -> str:
 
 
 def in_order(values: np.ndarray, form: str) -> tuple[np.ndarray, str, str]:
-    """Return times (n,) [s] whose dates with slashes are read as the whole column says, their form, and what is wrong.
+    """Return times (n,) [s] whose dates with slashes are read as the whole column shows, their form, and the problem
+    found.
 
     Dates that can be read in both ways were read with the day first; those that cannot say how all are meant. Nothing
     depends on it if all are one day.
@@ -148,7 +150,7 @@ def unit_by_values(clock: np.ndarray) -> list[str]:
 
 
 def _counts_in_sixties(clock: np.ndarray) -> bool:
-    """Say whether numbers can be hours, minutes and seconds in two digits each."""
+    """Return whether numbers can be hours, minutes and seconds in two digits each."""
     return bool(np.all((clock % 100.0 < 60.0) & (clock % 10_000.0 < 6_000.0) & (clock < 240_000.0)))
 
 
@@ -172,16 +174,18 @@ def over_midnight(clock: np.ndarray) -> np.ndarray:
 
 
 def first_after_setting(time: np.ndarray) -> int:
-    """Return the first row behind the last step of more than a year: before it, the clock was not set. 0 if none is."""
+    """Return the first row after the last step of more than a year: before it, the clock was not set. 0 if none
+    is.
+    """
     return int(np.flatnonzero(np.diff(time, prepend=time[:1]) > YEAR)[-1:].sum())
 
 
 def problem_of(time: np.ndarray, begins: Sequence[int], stride: int = 1) -> tuple[str, str] | None:
-    """Return what is wrong with times (n,) [s], and what to do; None if they increase.
+    """Return the problem with times (n,) [s], and its remedy; None if they increase.
 
     Args:
         time: of the rows. [s]
-        begins: rows in which the clock begins anew, `parts_of`.
+        begins: rows in which the clock begins again, `parts_of`.
         stride: of so many rows of the log one is here.
     """
     steps = np.diff(time)

@@ -66,10 +66,10 @@ def installed() -> tuple[str, str] | None:
 
 
 def check_film() -> None:
-    """Refuse to film where something that it takes is not installed, before anything is simulated.
+    """Raise an error if a package that is needed to film is not installed, before anything is simulated.
 
     Raises:
-        UserError: says what to install.
+        UserError: with the packages to install.
     """
     _needed()
     missing = [name for name in ("imageio_ffmpeg", "PIL") if find_spec(name) is None]
@@ -127,7 +127,7 @@ def film(page: Path, out: Path, progress: Callable[[float], None] | None = None)
     Args:
         page: a ``report.html`` with a replay.
         out: the film, which ends in .gif or .mp4.
-        progress: told the fraction that is done, from 0 to 1.
+        progress: called with the fraction that is done, from 0 to 1.
 
     Raises:
         UserError: if what it takes is not installed, or the page has no replay.

@@ -1,4 +1,4 @@
-"""The page of some runs of one trial, from what is known of them."""
+"""The page of some runs of one trial, made from their results."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def page_of_runs(
         summary: of `subzero.results.summary.summary_of`, perhaps with ``indices`` of each run.
         figures: by name.
         command: the line that makes them again.
-        record: what was measured.
+        record: the measured record.
         name: of the command, such as compare; by default the second word of its line.
     """
     first = next(iter(runs.values()))
@@ -56,7 +56,7 @@ def page_of_runs(
 
 
 def _can_be_replayed(run: xr.Dataset) -> bool:
-    """Say whether there is anything to replay: at least two samples, of a vehicle whose shape is known."""
+    """Return whether there is anything to replay: at least two samples, of a vehicle whose shape is known."""
     shape = json.loads(run.attrs["parameters"]).get("vehicle", {})
     return run.sizes["time"] > 1 and all(name in shape for name in HULL)
 
@@ -66,7 +66,7 @@ def _scenario_word(command: str) -> str:
 
 
 def _outcome(label: str, run: dict[str, Any]) -> list[Line]:
-    """Return what one reads first of a run."""
+    """Return the headlines of a run."""
     is_complete = run["outcome"] == "completed"
     end = NOTHING if run["time_at_end_s"] is None else f"{run['time_at_end_s']:g} s"
     message = "" if is_complete else f": {run['outcome_message']}"
@@ -86,13 +86,13 @@ def _warnings(summary: dict[str, Any], labels: list[str]) -> dict[str, list[str]
 
 
 def _sections(tables: list[Table], figures: Mapping[str, Figure]) -> list[Section]:
-    """Return the numbers, each table a section of its own, and the figures behind them."""
+    """Return the numbers, each table a section of its own, and the figures after them."""
     numbers = [Section(title=table.title, tables=[table]) for table in tables]
     return [*numbers, Section(title="Figures", figures=figures)] if figures else numbers
 
 
 def _tables(summary: dict[str, Any], labels: list[str]) -> list[Table]:
-    """Return the numbers: indices of a manoeuvre, what one reads first, and how well a record is explained."""
+    """Return the numbers: indices of a manoeuvre, the headlines, and how well a record is explained."""
     tables = [Table(title="Numbers", header=("", *labels), groups=number_groups(summary))]
     if all("indices" in summary[label] for label in labels):
         tables.insert(0, Table(title="Indices", header=("", *labels), groups=[_indices(summary, labels)]))
@@ -117,7 +117,7 @@ def _indices(summary: dict[str, Any], labels: list[str]) -> list[tuple[str, ...]
 
 
 def _sources(run: xr.Dataset) -> dict[str, str]:
-    """Return what a run came from: the scenario as it was read, all parameters, the versions of the libraries."""
+    """Return the provenance of a run: the scenario as it was read, all parameters, the versions of the libraries."""
     parameters = json.dumps(json.loads(run.attrs["parameters"]), indent=2, ensure_ascii=False)
     versions = {"subzero": run.attrs["subzero_version"], **json.loads(run.attrs["versions"])}
     return {

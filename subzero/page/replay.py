@@ -1,4 +1,4 @@
-"""What the replay of a page needs of some runs: poses, channels and cable shapes, small enough to stand inside it.
+"""The data of the replay of some runs: poses, channels and cable shapes, small enough to be embedded in the page.
 
 A series of numbers x is stored as 16-bit integers c, little-endian, in base64,
 
@@ -6,8 +6,8 @@ A series of numbers x is stored as 16-bit integers c, little-endian, in base64,
 
 so that it is known to half a step: 0.2 mm on a track of 25 m, 8 mm on one of a kilometre. Samples are left out evenly
 where there are more than a page should carry, and the cable is given at a fixed number of points, spread evenly over
-its nodes, so that what is graded finely near the vehicle stays fine. Nothing is smoothed, and nothing invented: every
-sample of the replay is one of the run.
+its nodes, so that a cable with short segments near the vehicle is shown as finely there. Nothing is smoothed, and
+nothing is invented: every sample of the replay is one of the run.
 
 Axes are north, east and down from where the vehicle starts; channels have the units of `subzero.channels`.
 """
@@ -34,10 +34,10 @@ MOST_SAMPLES, MOST_SHAPES, MOST_POINTS = 4000, 1200, 80
 """Samples of channels, shapes of the cable and points of a shape that a page carries of one run."""
 
 MISSING, LOWEST, STEPS = -32768, 32767, 65534
-"""The code for no number; what is added to a code; the steps between the lowest and the highest."""
+"""The code for no number; the number added to a code; the steps between the lowest and the highest."""
 
 HULL = ("hull", "rudder", "stern_planes", "propeller", "tow_point")
-"""Sections of a vehicle's parameters that say what it looks like."""
+"""Sections of a vehicle's parameters that determine its appearance."""
 
 POSE = ("north", "east", "depth", "roll_angle", "pitch", "heading")
 ACTUATORS = ("propeller_speed", "rudder_angle", "stern_plane_port_angle", "stern_plane_starboard_angle")
@@ -52,8 +52,8 @@ class Actor:
     """One vehicle of a replay, with its cable if it has one.
 
     Args:
-        name: what it is called beside it.
-        run: what it does.
+        name: its label in the replay.
+        run: its motion.
         ghost: drawn translucent, behind the others.
     """
 
@@ -71,8 +71,8 @@ def encode(actors: tuple[Actor, ...], record: Record | None = None) -> dict[str,
     """Return the data of a replay, ready for JSON.
 
     Args:
-        actors: who moves; the first one is followed.
-        record: what was measured, drawn as dots, and as a track if it has places.
+        actors: the vehicles that move; the first one is followed.
+        record: the measured record, drawn as dots, and as a track if it has places.
     """
     first = actors[0].run
     parameters = json.loads(first.attrs["parameters"])
@@ -92,7 +92,7 @@ def encode(actors: tuple[Actor, ...], record: Record | None = None) -> dict[str,
 
 
 def _actor(actor: Actor) -> dict[str, Any]:
-    """Return what one vehicle does."""
+    """Return the motion of one vehicle."""
     run = actor.run
     kept = _spread(run.sizes["time"], MOST_SAMPLES)
     channels = {
@@ -110,7 +110,7 @@ def _actor(actor: Actor) -> dict[str, Any]:
 
 
 def _measured(record: Record) -> dict[str, Any]:
-    """Return what was measured, in the channels that the page knows."""
+    """Return the measurements, in the channels of the page."""
     kept = _spread(record.time.size, MOST_SAMPLES)
     values = {name: pack(values[kept]) for name, values in record.values.items() if name in BY_NAME}
     return {"time": pack_exactly(record.time[kept]), "channels": values}
@@ -183,13 +183,13 @@ def _base64(values: np.ndarray) -> str:
 def as_run(record: Record, beside: xr.Dataset, used: Mapping[str, np.ndarray]) -> xr.Dataset | None:
     """Return a record as a run at its own times, to be shown as a vehicle; None if it does not say where that went.
 
-        dx/dt = R(roll, pitch, heading) (u, v, w),    from where the run beside it is at the first sample
+        dx/dt = R(roll, pitch, heading) (u, v, w),    from the position of the other run at the first sample
 
     Places that were measured are taken as they are; else they are reckoned so, with v and w as measured, 0 where they
     are not. A record with neither places nor speed and heading does not say where the vehicle went.
 
     Args:
-        record: what was measured.
+        record: the measured record.
         beside: a run of the same trial, which lends its fins, its propeller and the angles that were not measured.
         used: channel → which samples are no outliers, (samples,) of bool; all of them where it has none.
     """

@@ -1,4 +1,4 @@
-"""The one page of all commands: what came out, in words; the replay; warnings, numbers, figures; how to do it again.
+"""The one page of all commands: the outcome in words; the replay; warnings, numbers, figures; how to repeat it.
 
 The page is one file that loads nothing. It is made of a template (`assets/template.html`), whose engine escapes every
 text that comes from a user; of figures as SVG, inside as images, so that nothing in them can act; and of the player's
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MODULES = ("vectors", "data", "meshes", "shaders", "scene", "camera", "plan", "plots", "player")
-"""The modules of the player, each behind those that it imports."""
+"""The modules of the player, each after those that it imports."""
 
 FIGURES = {
     "fig4": "Tension of a straight pull, computed and exact",
@@ -47,7 +47,7 @@ FIGURES = {
     "gain": "Error of the simulation before and after, in noise of the sensors",
     "missing_force": "What no cause of the catalogue explains, over time",
 }
-"""What a figure shows, by its name or the beginning of it."""
+"""The content of a figure, by its name or the beginning of it."""
 
 SVG_STYLE: dict[Any, Any] = {
     "svg.hashsalt": "subzero",
@@ -69,7 +69,7 @@ class Table:
 
 @dataclass(frozen=True, kw_only=True)
 class Line:
-    """What one reads first: a few words, and whether they are good news."""
+    """The headline of a page: a few words, and whether they are good news."""
 
     text: str
     kind: Literal["good", "bad"] = "good"
@@ -117,20 +117,20 @@ class Section:
 
 @dataclass(frozen=True, kw_only=True)
 class Report:
-    """What a page says.
+    """The contents of a page.
 
     Args:
         command_name: of the command that made it, such as compare.
         scenario: name of the trial.
         title: the trial in words.
         version: of subzero.
-        outcome: what one reads first.
+        outcome: the headlines.
         command: the line that does it again.
-        answers: what a reader who was not there asks first.
-        warnings: what may be wrong, by run.
+        answers: answers to the first questions of a reader who was not there.
+        warnings: the warnings, by run.
         sections: numbers and figures, in the order in which one reads them.
         replay: of `subzero.page.replay.encode`; None without one.
-        replay_words: what the replay shows that its controls do not say.
+        replay_words: remarks on the replay that its controls do not give.
         sources: texts to unfold at the end, by name.
         is_bare: show the replay alone, to stand in another page.
     """
@@ -167,7 +167,7 @@ def render(report: Report) -> str:
 
 
 def caption(name: str) -> str:
-    """Return what a figure shows; of one of several of a kind, the record behind its kind's name."""
+    """Return the content of a figure; of one of several of a kind, the record after its kind's name."""
     known = next((kind for kind in FIGURES if name == kind or name.startswith(f"{kind}_")), None)
     if known is None:
         return name.replace("_", " ")

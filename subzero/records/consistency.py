@@ -2,7 +2,7 @@
 
 Times: a record has to lie within its trial and be long, dense and complete enough. Commands stand in the scenario, in
 the record, or in both, which then have to agree. Units: what looks like another unit is asked about, not guessed. The
-nominal simulation is the yardstick: a channel that fits it much better in another unit, or with the other sign, is
+nominal simulation is the reference: a channel that fits it much better in another unit, or with the other sign, is
 probably in that unit. A vehicle that is merely wrong is not asked about: its channel fits badly either way.
 """
 
@@ -85,7 +85,7 @@ def is_constant(values: np.ndarray) -> bool:
 
 
 def repeating(values: Mapping[str, np.ndarray]) -> list[str]:
-    """Return the channels of which most samples repeat the one before: their noise is hard to tell."""
+    """Return the channels of which most samples repeat the one before: their noise is hard to estimate."""
     return [
         name
         for name, value in values.items()
@@ -147,7 +147,7 @@ SAME_TIME_S = 1e-6
 
 
 def epoch_problems(record: Record, trial: scenarios.Trial) -> list[str]:
-    """Return what is wrong if a record begins outside its trial."""
+    """Return the problem that a record begins outside its trial, if it does."""
     first = record.time[0]
     if 0.0 <= first < trial.duration:
         return []
@@ -158,7 +158,7 @@ def epoch_problems(record: Record, trial: scenarios.Trial) -> list[str]:
 
 
 def time_problems(record: Record, trial: scenarios.Trial, *, longer: bool) -> list[str]:
-    """Return what is wrong with the times of a record; it may be `longer` than its trial if it has its own commands."""
+    """Return the problems of the times of a record; it may be `longer` than its trial if it has its own commands."""
     time, problems = record.time, epoch_problems(record, trial)
     if problems:
         return problems
@@ -223,7 +223,7 @@ def trial_with_commands(trial: scenarios.Trial, record: Record, use: str | None)
     """
     names = [name for name in REPORTED_COMMANDS if name in record.values]
     if use == FROM_RECORD:
-        return _told_by(record, names, trial)
+        return _with_recorded_commands(record, names, trial)
     if trial.commands is None:
         raise UserError(
             f"The scenario {trial.name} prescribes the motion, so nothing tells what the vehicle was commanded. "
@@ -235,7 +235,7 @@ def trial_with_commands(trial: scenarios.Trial, record: Record, use: str | None)
 
 
 def _agree(trial: scenarios.Trial, record: Record, names: list[str]) -> None:
-    """Refuse commands that differ, and say from when on."""
+    """Raise an error for commands that differ, with the time of the first difference."""
     assert trial.commands is not None
     step = float(np.median(np.diff(record.time))) if record.time.size > 1 else 0.0
     for name in names:
@@ -254,8 +254,8 @@ def _agree(trial: scenarios.Trial, record: Record, names: list[str]) -> None:
             )
 
 
-def _told_by(record: Record, names: list[str], trial: scenarios.Trial) -> scenarios.Trial:
-    """Return the trial with the record's commands; columns that it does not have stay the scenario's."""
+def _with_recorded_commands(record: Record, names: list[str], trial: scenarios.Trial) -> scenarios.Trial:
+    """Return the trial with the record's commands; columns that it does not have remain those of the scenario."""
     if not names:
         wanted = ", ".join(BY_NAME[name].column for name in REPORTED_COMMANDS)
         raise UserError(
@@ -274,7 +274,7 @@ def _told_by(record: Record, names: list[str], trial: scenarios.Trial) -> scenar
 
 
 def _column(record: Record, name: str, at: int, others: scenarios.Commands | None) -> np.ndarray:
-    """Return a command at the record's times, in inner units; a gap holds what was before it."""
+    """Return a command at the record's times, in inner units; a gap holds the value before it."""
     if name not in record.values:
         assert others is not None
         return others.at(record.time)[:, at]

@@ -1,4 +1,4 @@
-"""What a user can say of a measured record: a TOML file beside it, with the same name.
+"""Metadata of a measured record that a user can give: a TOML file in the same folder, with the same name.
 
 source = "basin trial of 12 May, run 3"
 scenario = "fig6"               # the trial it belongs to; else the one of the command line
@@ -36,7 +36,7 @@ OVER = ("water", "ground")
 
 @dataclass(frozen=True, kw_only=True)
 class Metadata:
-    """What is known of a record.
+    """The metadata of a record.
 
     Attributes:
         source: where it comes from.
@@ -139,7 +139,7 @@ def _checked(source: Source) -> list[str]:
 
 
 def _table(source: Source, name: str) -> list[str]:
-    """Return what is wrong with a table of columns and positive numbers."""
+    """Return the problems of a table of columns and positive numbers."""
     table = source.table.get(name, {})
     if not isinstance(table, Mapping):
         return [f"{_at(source, name)}: this is not a section; write [{name}] and a line for each column"]

@@ -7,7 +7,7 @@ continuous (`scenarios.heading`).
 
 A heading is known but for whole turns: one compass begins at 359 degrees where another, or a run, begins at −1. So a
 run's heading is counted from its trial's start, without a jump wherever that lies, and a record's from the run's, with
-the turns of its yaw rate, or else of the run (`beside`).
+the turns of its yaw rate, or else of the run.
 
 The files that a run writes are themselves records, so one run can be compared with another.
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 YAW_RATE = "yaw_rate"
-"""The channel that tells how often a heading has turned."""
+"""The channel that shows how often a heading has turned."""
 
 GAPS = ("", "nan", "+nan", "-nan")
 """Cells that hold no measurement; numerical libraries write a NaN with either sign."""
@@ -62,7 +62,7 @@ TIMES_OF_DAY = {
     r"\d{4}-\d\d-\d\d[T ]": "dates and times",
     r"(\d+ days? )?\d+:\d\d(:\d\d)?([.,]\d+)?$": "hours, minutes and seconds",
 }
-"""What a time looks like that is no number, and what it is."""
+"""Forms of a time that is no number, and their names."""
 
 Row = tuple[int, list[str]]
 """Line number in the file (from 1), and its cells."""
@@ -70,13 +70,13 @@ Row = tuple[int, list[str]]
 
 @dataclass(frozen=True, kw_only=True)
 class Record:
-    """What was measured: samples of some channels, with gaps.
+    """A measured record: samples of some channels, with gaps.
 
     Args:
         source: the file, as the user named it.
         time: time of each sample, increasing. Shape (samples,). [s]
         values: channel name → measured values in the channel's display unit, NaN where there is a gap.
-        notes: what was set aside in it, and why, in sentences.
+        notes: data that were set aside, and why, in sentences.
         intervals: channel → time between two measurements, where a logger filled in what lies between. [s]
     """
 
@@ -117,7 +117,7 @@ def read_record(path: str | Path) -> Record:
 
 
 def as_measured(record: Record) -> Record:
-    """Return a record as it is used: without what a logger filled in, its heading without jumps."""
+    """Return a record for use: without the values that a logger filled in, its heading without jumps."""
     record = measured_alone(record)
     if HEADING not in record.values:
         return record
@@ -193,7 +193,7 @@ OTHER_WORDS = {
     "north_m": ("north", "northing"),
     "east_m": ("east", "easting"),
 }
-"""A column → what other loggers call it."""
+"""A column → its names in other loggers."""
 
 USUAL = "surge_speed_m_s, heading_deg, yaw_rate_deg_s, pitch_deg, roll_deg, depth_m, cable_tension_N"
 """Columns that many records have."""
@@ -205,7 +205,7 @@ SLIP_LIKENESS = 0.75
 """A name that is so much like a column is that column with a slip of the pen."""
 
 SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars"}
-"""What stands between the cells of a file that is no CSV."""
+"""Separators between the cells of a file that is no CSV."""
 
 
 def _header_problems(header: list[str]) -> list[str]:
@@ -262,7 +262,7 @@ def _meant(name: str) -> str:
 
 
 def _numbers(name: str, at: int, rows: list[Row], problems: list[str]) -> np.ndarray:
-    """Return one column as numbers; what is no number becomes a problem."""
+    """Return one column as numbers; entries that are not numbers become problems."""
     column = np.full(len(rows), np.nan)
     for index, (line, row) in enumerate(rows):
         cell = row[at]
@@ -356,7 +356,7 @@ class Fit:
         rmse: root of the mean squared error.
         bias: mean error; positive if the model gives too much.
         fit_percent: 100 (1 − |error| / |measured − its mean|): 100 is perfect, 0 no better than the mean;
-            NaN if what was measured does not vary.
+            NaN if the measurements do not vary.
     """
 
     samples: int
@@ -372,7 +372,7 @@ def modelled(run: xr.Dataset, name: str, time: np.ndarray) -> np.ndarray:
 
 
 def fit(run: xr.Dataset, record: Record, name: str) -> Fit:
-    """Compare one channel of a run with what was measured."""
+    """Compare one channel of a run with its measurements."""
     measured = record.values[name]
     error = modelled(run, name, record.time) - measured
     known = np.isfinite(error)
@@ -409,7 +409,7 @@ def with_heading_of(record: Record, simulated: np.ndarray | None) -> Record:
 
 
 def _contradicted(time: np.ndarray, column: str) -> str:
-    """Return what is said of samples that contradict those around them, at these times [s]."""
+    """Return a sentence about samples that contradict those around them, at these times [s]."""
     when = f"at {time[0]:g} s" if time.size == 1 else f"between {time[0]:g} and {time[-1]:g} s"
     return (
         f"{column}: {time.size} sample{'s' * (time.size > 1)} {when} contradict{'s' * (time.size == 1)} those "

@@ -1,4 +1,4 @@
-"""What a run gives, as values and as files.
+"""The results of a run, as values and as files.
 
 dataset       the labelled result of a run (`xarray.Dataset`), units and meanings with it
 summary       its key figures, as in ``summary.json``

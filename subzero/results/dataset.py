@@ -52,12 +52,12 @@ AXES = {
     ),
     "earth_axis": (["north", "east", "down"], "axis of the earth-fixed frame"),
 }
-"""Named axes of the arrays: their labels, and what they are."""
+"""Named axes of the arrays: their labels, and their meaning."""
 LIBRARIES = ("numpy", "numba", "xarray")
 
 
 class Variable(NamedTuple):
-    """An array of a run: names of its axes, its values and what they are."""
+    """An array of a run: names of its axes, its values and their attributes."""
 
     axes: str | tuple[str, ...]
     values: Any
@@ -71,7 +71,7 @@ class PlainRun:
     Attributes:
         variables: by name.
         coordinates: by name.
-        attrs: where it came from, how it ended, and what may be wrong with it.
+        attrs: its provenance, its outcome, and the warnings.
     """
 
     variables: dict[str, Variable]
@@ -101,12 +101,12 @@ def plain_run(
     """Return a run by the names of its dataset; angles in degrees, all other channels in SI and rev/s.
 
     Args:
-        trial: what was run.
+        trial: the trial that was run.
         model: with which model.
         tethered: with the cable.
         run: the run.
         accuracy: how far its force can be trusted, if that is known.
-        spends: the result may take over the memory of the run's shapes: nobody looks at the run any more.
+        spends: the result may take over the memory of the run's shapes; the run is not used afterwards.
     """
     values = channel_values(run, model)
     diagnostics = _diagnostics(run, values, model)
@@ -196,7 +196,7 @@ def _tow_velocities(run: Run, model: Model) -> np.ndarray:
 
 
 def _arrays(run: Run, spends: bool) -> dict[str, Variable]:
-    """Return the force breakdown, and the cable's nodes in rows of equal length, NaN behind the last node."""
+    """Return the force breakdown, and the cable's nodes in rows of equal length, NaN after the last node."""
     r = run.recording
     position, tension = _by_node(r, r.position, spends), _by_node(r, r.tension, spends)
     about = (
@@ -250,16 +250,16 @@ BLOCK = 512
 
 
 def _by_node(r: Recording, packed: np.ndarray, spends: bool) -> np.ndarray:
-    """Return what is packed node by node in rows of equal length (n, nodes, …), NaN behind the last node.
+    """Return an array packed node by node in rows of equal length (n, nodes, …), NaN after the last node.
 
-    What is spent is spread where it is, for there is room behind it: a long run then needs its memory once, not twice.
-    From the last row on: no row is written to where one lies that is still to be read.
+    With `spends` the rows are spread in place, as the array has space after them: a long run then needs its memory
+    once, not twice. Rows are moved from the last one on, so that no row is written over one that is still to be read.
     """
     nodes = max(int(r.nodes.max(initial=0)), 1)
-    room = packed.base if spends and packed.base is not None else packed
-    if room.shape[0] < r.nodes.size * nodes or room.shape[1:] != packed.shape[1:]:
-        room = np.empty((r.nodes.size * nodes, *packed.shape[1:]))
-    rows: np.ndarray = room[: r.nodes.size * nodes].reshape(r.nodes.size, nodes, *packed.shape[1:])
+    buffer = packed.base if spends and packed.base is not None else packed
+    if buffer.shape[0] < r.nodes.size * nodes or buffer.shape[1:] != packed.shape[1:]:
+        buffer = np.empty((r.nodes.size * nodes, *packed.shape[1:]))
+    rows: np.ndarray = buffer[: r.nodes.size * nodes].reshape(r.nodes.size, nodes, *packed.shape[1:])
     ends = np.concatenate([[0], np.cumsum(r.nodes)])
     for first in reversed(range(0, r.nodes.size, BLOCK)):
         last = min(first + BLOCK, r.nodes.size)
@@ -278,7 +278,7 @@ def _as_items(array: np.ndarray, axes: int) -> np.ndarray:
 
 
 def _diagnostics(run: Run, values: dict[str, np.ndarray], model: Model) -> dict[str, Variable]:
-    """Return what tells how far to trust the cable, row by row."""
+    """Return the variables that show how far to trust the cable, row by row."""
     r, words = run.recording, "how far the cable, summed up from the drum, ends from the tow point"
     wave = "segments of the cable that a transverse wave crosses in an exchange, at most"
     return {
@@ -307,7 +307,7 @@ def _closure_error(run: Run, values: dict[str, np.ndarray], model: Model) -> np.
 
 
 def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) -> dict[str, Any]:
-    """Return what the result came from; no clock, so that two runs are alike to the last bit."""
+    """Return the provenance of the result; no clock, so that two runs are alike to the last bit."""
     motion = trial.motion
     return {
         "scenario": trial.name,
@@ -331,7 +331,7 @@ def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) 
 
 @cache
 def _versions() -> dict[str, str]:
-    """Return the versions of what computed it; looked up once, for each time a file is read."""
+    """Return the versions of the software; looked up once, for each time a file is read."""
     return {
         "subzero_version": version(DISTRIBUTION),
         "versions": json.dumps({name: version(name) for name in LIBRARIES}),

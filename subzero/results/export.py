@@ -60,7 +60,7 @@ def export(run: xr.Dataset, path: str | Path, kind: str | None = None) -> None:
 
 
 def writer_of(kind: str) -> Callable[[xr.Dataset, Path], None]:
-    """Return what writes a kind of file, once its library is known to be there.
+    """Return the writer of a kind of file, once its library is known to be there.
 
     Raises:
         UserError: there is no such kind, or no library for it.
@@ -181,7 +181,7 @@ def _shapes(run: xr.Dataset) -> list[np.ndarray] | None:
 
 
 def _reported(run: xr.Dataset) -> Iterator[tuple[int, str]]:
-    """Give the level and the words of what a run says of itself."""
+    """Return the level and the words of the messages of a run."""
     for load in json.loads(run.attrs.get("warnings", "[]")):
         yield WARNING, f"{load['check']}: {load['message']}"
     if run.attrs["outcome"] != "completed":
@@ -220,7 +220,7 @@ def _scene(at: int, name: str, frame: str, **shapes: list[dict[str, Any]]) -> di
 
 YELLOW, ORANGE = {"r": 1.0, "g": 0.8, "b": 0.1, "a": 1.0}, {"r": 1.0, "g": 0.45, "b": 0.0, "a": 1.0}
 THICKNESS_PX = 2.0
-"""Of the cable, a few millimetres thick, which nobody would see at its own."""
+"""Drawn thickness of the cable, which at its own thickness, a few millimetres, would not be visible."""
 
 
 def _hull(run: xr.Dataset) -> dict[str, Any]:
@@ -252,7 +252,9 @@ def _line(points: np.ndarray) -> dict[str, Any]:
 
 
 def write_mat(run: xr.Dataset, path: Path) -> None:
-    """Write every variable as one of MATLAB's, with structures of units, meanings and axes, and what a run says."""
+    """Write every variable as one of MATLAB's, with structures of units, meanings and axes, and the run's
+    attributes.
+    """
     from scipy.io import savemat
 
     everything: dict[str, Any] = {str(name): _matlab(run[name].values) for name in run.variables}
@@ -317,7 +319,7 @@ STANDARD_NAMES = {
 }
 """Our name → that of the CF standard name table, where it means the same, sign included."""
 UDUNITS = {"rev/s": "revolution s-1"}
-"""Our unit → what UDUNITS calls it."""
+"""Our unit → its name in UDUNITS."""
 FORCE, MOMENT = ("X", "Y", "Z"), ("K", "M", "N")
 
 
@@ -332,7 +334,7 @@ def as_cf(run: xr.Dataset) -> xr.Dataset:
     """Return a run as CF 1.11 wants it.
 
     Forces and moments of `force_breakdown`, which share no unit, are two variables. Names along an axis are labels
-    beside it, since a coordinate has to be a number. The longest axis, time, comes last, as is recommended.
+    for it, since a coordinate has to be a number. The longest axis, time, comes last, as is recommended.
     """
     cf = run.copy()
     if "force_breakdown" in run:
@@ -374,4 +376,4 @@ KINDS: dict[str, tuple[str, str, Callable[[xr.Dataset, Path], None]]] = {
     "parquet": (".parquet", "pyarrow.parquet", write_parquet),
     "cf": ("_cf.nc", "netCDF4", write_cf),
 }
-"""Kind → ending of its files, the library that it needs, what writes it."""
+"""Kind → ending of its files, the library that it needs, its writer."""

@@ -1,4 +1,4 @@
-"""Write what a command leaves behind: runs, summaries and figures; all of them are delivered, or none."""
+"""Write the files of a command: runs, summaries and figures; all of them are delivered, or none."""
 
 from __future__ import annotations
 
@@ -171,12 +171,12 @@ def _forget_homeless(file: Any, found: set[str]) -> None:
 
 def _located(run: xr.Dataset, name: str) -> dict[str, str]:
     """Return the attribute that names the coordinates of a variable that are no axes of it, by the CF conventions."""
-    beside = sorted(
+    auxiliary = sorted(
         str(coord)
         for coord, values in run.coords.items()
         if coord not in run.dims and set(values.dims) <= set(run[name].dims)
     )
-    return {"coordinates": " ".join(beside)} if beside and name not in run.coords else {}
+    return {"coordinates": " ".join(auxiliary)} if auxiliary and name not in run.coords else {}
 
 
 def write_csv(run: xr.Dataset, path: Path) -> None:
@@ -230,7 +230,7 @@ def write_figures(figures: Mapping[str, Figure], output_folder: OutputFolder, ki
 
 
 def save(figure: Figure, to: Path | IO[bytes], kind: str) -> None:
-    """Write a figure to a file, or to what is open."""
+    """Write a figure to a file, by its path or open."""
     import matplotlib as mpl
 
     with mpl.rc_context(DRAWING), lacking_letters_as_boxes():

@@ -1,4 +1,4 @@
-"""A run in a few numbers: what one reads first, each with its unit in its name.
+"""A run in a few numbers: the main results, each with its unit in its name.
 
 Plain numbers, texts and mappings only, so a summary can be printed, stored as JSON and compared. A number
 that does not exist (the heading of a run without samples, the balance of a prescribed run) is None.
@@ -58,7 +58,7 @@ def summarise(run: AnyRun) -> dict[str, Any]:
 
 
 def diagnostics(run: AnyRun) -> dict[str, float | int | None] | None:
-    """Return the numbers that tell how far to trust the cable; None for a run without one.
+    """Return the numbers that show how far to trust the cable; None for a run without one.
 
     ``energy_residual`` is what the balance of all energies leaves unexplained at the end, as a share of the work and
     the losses in all; a scheme that keeps no such balance has none.
@@ -82,7 +82,7 @@ def summary_of(runs: dict[str, xr.Dataset], record: Record | None) -> dict[str, 
 
     Args:
         runs: runs by name, tethered, untethered or both.
-        record: what was measured.
+        record: the measured record.
 
     Returns:
         scenario, title, subzero_version, prescribed; each run's `summarise` under its name; and ``measured``:
@@ -143,5 +143,5 @@ def at_end(run: AnyRun, name: str) -> float | None:
 
 
 def number(value: Any) -> float | None:
-    """Return a plain float that JSON can hold: None for what is not finite."""
+    """Return a plain float that JSON can hold: None for a number that is not finite."""
     return float(value) if math.isfinite(value) else None

@@ -1,4 +1,6 @@
-"""What a command prints about its runs: a short table, the energy balance, how well a record is explained."""
+"""The tables that a command prints about its runs: a short table, the energy balance, how well a record is
+explained.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,7 @@ Summary = dict[str, Any]
 """The summary of one run, as `subzero.results.summary.summarise` gives it."""
 
 Row = tuple[str, ...]
-"""The cells of a row; the first says what the others are."""
+"""The cells of a row; the first is the label of the others."""
 
 NOTHING = "–"
 SHOWN_CHANNELS = 12
@@ -38,7 +40,7 @@ DIAGNOSTIC_ROWS = {
     "smallest_tension_N": ("smallest tension in the cable [N]", "{:.4f}"),
     "newton_iterations": ("Newton iterations", "{:d}"),
 }
-"""What tells how far to trust the cable: words, and how to write the number."""
+"""Diagnostics that show how far to trust the cable: words, and how to write the number."""
 
 
 INDEX_UNITS = {
@@ -62,8 +64,8 @@ def index_in_words(name: str) -> str:
 
 
 def show(summary: Summary, console: Console, *, whole: bool = False) -> None:
-    """Print a summary, as `subzero.simulation.comparison.summary_of` gives it; the whole of it with what tells how
-    far to trust the cable, of which a warning speaks where it matters.
+    """Print a summary, as `subzero.simulation.comparison.summary_of` gives it; the whole of it with the diagnostics
+    of the cable, of which a warning speaks where it matters.
     """
     console.print(f"[bold]{escape(summary['scenario'])}[/bold]: {escape(summary['title'])}", highlight=False)
     console.print(_runs_table(summary, whole), highlight=False)
@@ -81,7 +83,7 @@ def show(summary: Summary, console: Console, *, whole: bool = False) -> None:
 
 
 def show_warnings(runs: dict[str, Summary], console: Console) -> None:
-    """Print what may be wrong with each run, sentence by sentence; nothing if nothing is."""
+    """Print the warnings about each run, sentence by sentence; nothing if there are none."""
     for label, run in runs.items():
         if run["warnings"]:
             console.print(f"Warnings, {label} run:", highlight=False, markup=False)
@@ -92,7 +94,7 @@ def show_warnings(runs: dict[str, Summary], console: Console) -> None:
 
 
 def number_groups(summary: Summary, *, whole: bool = True) -> list[list[Row]]:
-    """Return what one reads first, runs side by side: rows in groups, each a row's words and a cell for each run."""
+    """Return the main results, runs side by side: rows in groups, each a row's words and a cell for each run."""
     runs = [summary[label] for label in RUNS if label in summary]
     first = _rows(bool(summary["prescribed"])).items()
     groups: list[list[Row]] = [[(words, *map(cell, runs)) for words, cell in first]]
@@ -104,7 +106,7 @@ def number_groups(summary: Summary, *, whole: bool = True) -> list[list[Row]]:
 
 
 def _runs_table(summary: Summary, whole: bool) -> Table:
-    """Return the table of what one reads first, runs side by side."""
+    """Return the table of the main results, runs side by side."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("")
     for label in (label for label in RUNS if label in summary):
@@ -160,7 +162,7 @@ def _energy_rows(balances: list[Summary]) -> list[Row]:
 
 
 def _diagnostic_rows(found: list[Summary]) -> list[Row]:
-    """Return what tells how far to trust the cable; nothing where there is no cable."""
+    """Return the diagnostics that show how far to trust the cable; none where there is no cable."""
     return [
         (words, *(NOTHING if (x := each.get(key)) is None else form.format(x) for each in found))
         for key, (words, form) in DIAGNOSTIC_ROWS.items()
@@ -168,7 +170,7 @@ def _diagnostic_rows(found: list[Summary]) -> list[Row]:
 
 
 def _refinement_table(label: str, channels: Summary) -> Table:
-    """Return the table of what changes with half the steps and segments, the worst channels first."""
+    """Return the table of the changes with half the steps and segments, the worst channels first."""
     table = Table(
         title=f"Change of the {label} run by half the steps and segments", box=box.SIMPLE_HEAD, pad_edge=False
     )

@@ -37,7 +37,7 @@ from subzero.jit import Record
 
 MANIFEST, STATE, LOCK = "manifest.json", "state.npz", "lock"
 COUNTS = ("behind", "used", "ending", "room")
-"""Of a state: times behind, nodes in use, how the last call ended, nodes at most."""
+"""Of a state: times done, nodes in use, how the last call ended, nodes at most."""
 MINUTE_S = 60.0
 BYTES_A_NODE = 5 * 8
 """Place, tension and arc length."""
@@ -46,7 +46,7 @@ BYTES_A_NODE = 5 * 8
 @checked_arguments
 @dataclass(frozen=True, kw_only=True)
 class Checkpoint:
-    """Where a run keeps where it stands, and how often.
+    """Where a run saves its state, and how often.
 
     >>> Checkpoint(folder="transect.checkpoint", minutes=10.0).minutes
     10.0
@@ -60,7 +60,7 @@ class Checkpoint:
     minutes: float = 5.0
 
     def __post_init__(self) -> None:
-        """Refuse what is no time."""
+        """Raise an error if the interval is not valid."""
         object.__setattr__(self, "minutes", checked("Checkpoint", "minutes", self.minutes, least=0.0))
         object.__setattr__(self, "folder", Path(self.folder))
 
@@ -73,7 +73,7 @@ class Checkpoint:
             return None
 
     def remove(self) -> None:
-        """Remove its files, when the result is safe; others that are in the folder stay."""
+        """Remove its files, when the result is safe; other files in the folder are kept."""
         for manifest in Path(self.folder).glob(f"*/{MANIFEST}"):
             shutil.rmtree(manifest.parent)
         with suppress(OSError):
@@ -92,13 +92,13 @@ class Keeper:
         self._folder, self._every, self._runs = folder, every, 0
 
     def next_run(self) -> KeptRun:
-        """Return what keeps the next run."""
+        """Return the keeper of the next run."""
         self._runs += 1
         return KeptRun(self._folder / f"run-{self._runs}", self._every)
 
 
 class KeptRun:
-    """Keeps where one run stands.
+    """Saves the state of one run.
 
     Args:
         folder: of this run alone.
@@ -110,7 +110,7 @@ class KeptRun:
         folder.mkdir(exist_ok=True)
 
     def go_on(self, started: RunState) -> RunState:
-        """Return where the run stands that was kept here; what has `begun` where none was."""
+        """Return the saved state of the run; the given start if none was saved."""
         if not self._path.exists():
             return started
         state = _read(self._path)
@@ -129,7 +129,7 @@ class KeptRun:
         )
 
     def keep(self, now: RunState, times: np.ndarray, stride: int, *, at_once: bool = False) -> None:
-        """Keep where the run stands, if it is time for that, or at once."""
+        """Save the state of the run, if it is time for that, or at once."""
         is_due = at_once or monotonic() - self._kept >= self._every
         if not is_due or now.behind == self._times:
             return
@@ -149,7 +149,7 @@ class KeptRun:
 
 
 def _filled(now: RunState, stride: int) -> dict[str, np.ndarray]:
-    """Return what the arrays of a recording hold so far; the last row may be one that the next time replaces."""
+    """Return the filled parts of the arrays of a recording; the last row may be one that the next time replaces."""
     last = row_of(now.behind - 1, stride)
     is_whole = (now.behind - 1) % stride == 0
     nodes = now.used if is_whole else now.used + int(now.recording.nodes[last])
@@ -160,7 +160,7 @@ def _filled(now: RunState, stride: int) -> dict[str, np.ndarray]:
 
 
 def _recording(started: RunState, counts: Mapping[str, int], state: Mapping[str, np.ndarray]) -> Recording:
-    """Return a recording with what was kept of it, and room for the rest."""
+    """Return a recording with the saved rows, and space for the rest."""
     rows, times = started.recording.state.shape[0], started.recording.trace.shape[0]
     if not fits(BYTES_A_NODE * counts["room"]) or counts["behind"] > times or counts["used"] > counts["room"]:
         raise DamagedError("it has more rows than its run")
@@ -183,14 +183,14 @@ def _count(arrays: Mapping[str, np.ndarray], name: str) -> int:
 
 
 def _capacity(started: RunState, state: Mapping[str, np.ndarray]) -> int:
-    """Return for how many segments the kept line has room: at least as many as at the start."""
+    """Return the number of segments that the saved line has space for: at least as many as at the start."""
     name = "live.line.length"
     check_arrays(state, {name: (np.dtype(float), state[name].shape[:1])})
     return max(state[name].size, started.live.line.length.size) - 1
 
 
 def _kind(name: str) -> str:
-    """Return what the lines of an array of a recording are."""
+    """Return the meaning of the lines of an array of a recording."""
     return "nodes" if name in BY_NODE else "times" if name in BY_TIME else "rows"
 
 
@@ -227,7 +227,7 @@ def _write(path: Path, arrays: Mapping[str, np.ndarray]) -> None:
 
 
 def _read(path: Path) -> dict[str, np.ndarray]:
-    """Return the arrays of a file, if it is what was written."""
+    """Return the arrays of a file; raise an error if its contents have changed."""
     with _damage_named(path):
         inside = BytesIO(without_digest(path.read_bytes()))
         with np.load(inside, allow_pickle=False) as file:
@@ -236,7 +236,7 @@ def _read(path: Path) -> dict[str, np.ndarray]:
 
 @contextmanager
 def _damage_named(path: Path) -> Iterator[None]:
-    """Say of a file that is not what was written what to do."""
+    """Report damage to a file as a UserError with the remedy."""
     try:
         yield
     except (
@@ -256,12 +256,12 @@ def _damage_named(path: Path) -> Iterator[None]:
 
 @contextmanager
 def opened(checkpoint: Checkpoint, label: str, manifest: Mapping[str, str]) -> Iterator[Keeper]:
-    """Give what keeps the runs of a simulation.
+    """Return the keeper of the runs of a simulation.
 
     Args:
         checkpoint: where and how often.
         label: of this simulation among those that share the folder.
-        manifest: what they belong to: what → its digest.
+        manifest: the settings they belong to: name → its digest.
 
     Raises:
         UserError: it holds another simulation, another command has it, it cannot be written or read.
@@ -290,7 +290,7 @@ def _locked(folder: Path) -> Iterator[None]:
 
 
 def _refuse_another(folder: Path, manifest: Mapping[str, str]) -> None:
-    """Refuse the checkpoint of another simulation; mark a new one as this one's."""
+    """Raise an error for the checkpoint of another simulation; mark a new one as this one's."""
     path = folder / MANIFEST
     if not path.exists():
         unfinished = path.with_suffix(".new")
@@ -309,7 +309,7 @@ def _refuse_another(folder: Path, manifest: Mapping[str, str]) -> None:
 
 @contextmanager
 def _disk_errors_named(folder: Path) -> Iterator[None]:
-    """Say of a checkpoint that cannot be written what to do."""
+    """Report a checkpoint that cannot be written as an error with the remedy."""
     try:
         yield
     except OSError as error:

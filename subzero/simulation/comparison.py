@@ -1,6 +1,6 @@
-"""A run beside another one: the same trial without its cable and what was measured, or computed more finely.
+"""Comparison of a run with another: the same trial without its cable and a measured record, or computed more finely.
 
-`compare` simulates a trial with its cable and without, and sets both beside a record.
+`compare` simulates a trial with its cable and without, and compares both with a record.
 
 `check` says how much a run changes with half the steps and half the segment length: half of what the run was taken
 with, which is finer than its trial says where its `rtol` asked for it. What the halves change is about as large as the
@@ -57,8 +57,8 @@ class Comparison:
     Args:
         tethered: the run with the cable.
         untethered: the same commands, the same code, no cable.
-        trial: what was simulated.
-        measured: what was measured in that trial, if it was.
+        trial: the trial that was simulated.
+        measured: the measured record of that trial, if there is one.
     """
 
     tethered: xr.Dataset
@@ -92,7 +92,7 @@ class Comparison:
         return {"tethered": self.tethered, "untethered": self.untethered}
 
     def fits(self) -> dict[str, dict[str, Fit]]:
-        """Return channel → run → how well that run explains what was measured."""
+        """Return channel → run → how well that run explains the measurements."""
         return {} if self.measured is None else fits(self.runs, self.measured)
 
     def summary(self) -> dict[str, Any]:
@@ -115,12 +115,13 @@ def compare(
 
     Args:
         scenario: name of a shipped scenario, path of a scenario file, or a trial.
-        measured: a measured record or the path of one, to set beside both runs.
+        measured: a measured record or the path of one, to compare with both runs.
         model: another model than the one that the scenario describes.
         later: times of results [s] and the model that holds from each of them on.
-        every: time between results that are kept, as of `simulate`; a measured record is set beside all of them. [s]
+        every: time between results that are kept, as of `simulate`; a measured record is compared with all of them.
+            [s]
         checkpoint: keeps where both runs stand, as of `simulate`.
-        progress: told the fraction that is done, from 0 to 1, over both runs.
+        progress: called with the fraction that is done, from 0 to 1, over both runs.
 
     Raises:
         scenarios.ScenarioError: if the scenario cannot be used.
@@ -154,7 +155,7 @@ def compare(
 
 
 def _same_rows(trial: scenarios.Trial, model: Model | None, record: Record | None) -> scenarios.Trial:
-    """Return a trial that keeps as many results of both runs, of a long one, too: all of them beside a record."""
+    """Return a trial that keeps as many results of both runs, of a long one, too: all of them with a record."""
     kept = with_fewer_results(trial, model_of(trial, model), True)
     return kept if record is None or kept is trial else dataclasses.replace(trial, every=trial.cable_step)
 
@@ -171,7 +172,7 @@ def _checked(record: Record | None, trial: scenarios.Trial) -> Any:
 HALVED = ("cable_step", "hull_step", "segment_length", "grading", "far_grading")
 """Fields of a trial that the finer run has half as large."""
 TOW_FORCE = "tow_force"
-"""Row of the table for the force of the cable as a vector, beside the channels."""
+"""Row of the table for the force of the cable as a vector, in addition to the channels."""
 MOST = 0.01
 """A tow force that changes by more than this share of its largest value is warned of. [-]"""
 VECTORS = (
@@ -200,7 +201,7 @@ NOTHING = {
 
 @dataclass(frozen=True, kw_only=True)
 class Refinement:
-    """A run beside one with half the steps and half the segment length.
+    """A run compared with one with half the steps and half the segment length.
 
     Attributes:
         run: at the trial's own steps.
@@ -229,7 +230,7 @@ class Refinement:
 
     @property
     def warnings(self) -> tuple[RunWarning, ...]:
-        """What the change says about the run."""
+        """The meaning of the change for the run."""
         if self.finer.attrs["outcome"] != self.run.attrs["outcome"]:
             words = f"With half the steps and segments the run is {self.finer.attrs['outcome']}, and not "
             return (RunWarning("refinement", f"{words}{self.run.attrs['outcome']}: neither can be trusted."),)
@@ -271,14 +272,14 @@ def check(
     later: Later = (),
     progress: Progress | None = None,
 ) -> Refinement:
-    """Run a trial at its own steps and with half of them, and say what changes.
+    """Run a trial at its own steps and with half of them, and return the changes.
 
     Args:
         scenario: name of a shipped scenario, path of a scenario file, or a trial.
         model: another model than the one that the scenario describes.
         tethered: with the cable.
         later: times of results [s] and the model that holds from each of them on.
-        progress: told the fraction that is done, 0 to 1.
+        progress: called with the fraction that is done, 0 to 1.
 
     Raises:
         scenarios.ScenarioError: the scenario cannot be used, or half its steps are below their limits.
@@ -296,7 +297,7 @@ def refine(
     later: Later = (),
     progress: Progress | None = None,
 ) -> Refinement:
-    """Set a run of a trial beside a finer one; arguments as `check`."""
+    """Compare a run of a trial with a finer one; arguments as `check`."""
     other: dict[str, Any] = {"model": model, "later": later} if model or later else {}
     halvings = json.loads(run.attrs.get("accuracy", "{}")).get("halvings", 0)
     if THINNED in run.attrs:
@@ -316,7 +317,7 @@ def halved(trial: scenarios.Trial, times: int = 1) -> scenarios.Trial:
 def table_of(run: xr.Dataset, finer: xr.Dataset) -> xr.Dataset:
     """Return the largest change of every channel between two runs, worst first; see `Refinement.table`.
 
-    Compared at the times of the first run that both reach; what stays zero and what is commanded is left out.
+    Compared at the times of the first run that both reach; commands and channels that remain zero are left out.
     """
     names: dict[str, tuple[str, ...]] = {
         c.name: (c.name,) for c in CHANNELS if not c.name.endswith("_command")
@@ -331,7 +332,7 @@ def table_of(run: xr.Dataset, finer: xr.Dataset) -> xr.Dataset:
 
 
 def _row(name: str, parts: tuple[str, ...], run: xr.Dataset, finer: xr.Dataset) -> dict[str, Any] | None:
-    """Return the row of a channel, or of a vector with these parts; None for what stays zero or is unknown."""
+    """Return the row of a channel, or of a vector with these parts; None if it remains zero or is unknown."""
     time, there = run["time"].values, finer["time"].values
     time = time[time <= there[-1] + 1e-9]
     ours = np.array([run[part].values[: time.size] for part in parts])

@@ -140,7 +140,7 @@ def start_at_drum(setup: Setup, live: Live, w: BoxWorkspace) -> None:
 
 @compiled
 def pull_of(w: BoxWorkspace) -> tuple[float, float, float]:
-    """Return the force on the vehicle (12), earth axes; none from a drum that has not begun to turn. [N]."""
+    """Return the force on the vehicle (12), earth axes; none from a drum that does not turn yet. [N]."""
     if w.count[0] == 1 and abs(w.y[0, 1]) <= NOTHING:
         return 0.0, 0.0, 0.0
     return node_force(w, 0)
@@ -186,7 +186,7 @@ REMEDIES = {
     "paper_tangent": 'scheme = "moving_end", the default, or a longer cable_step_s',
     "paper_drum": 'scheme = "moving_end", or scheme = "paper_tangent", whose new node is not turned around the drum',
 }
-"""What to try; a free drum lets segments shorter than m1/(½ρπdC_t) ring, a quarter of a metre for Table 1."""
+"""The advice; a free drum lets segments shorter than m1/(½ρπdC_t) ring, a quarter of a metre for Table 1."""
 
 
 def run_as_printed(
@@ -237,7 +237,7 @@ def lay_cable(trial: scenarios.Trial, model: Model, setup: Setup, live: Live, ro
 
 
 def in_words(trial: scenarios.Trial, ending: int, report: NewtonReport, time: float) -> str:
-    """Say when and where the run stopped on its way to `time` [s], and what to try."""
+    """Return when and where the run stopped on its way to `time` [s], and the advice."""
     reason = f"the vehicle's speed is absurd (more than {FASTEST:g} m/s, or not a number)"
     if ending == CABLE_FAILED:
         reason = (

@@ -1,4 +1,4 @@
-"""How much memory a run will need, told before it is asked for.
+"""How much memory a run will need, estimated before it is allocated.
 
 What grows is the cable's shape, kept at every step: the way that the tow point goes is estimated from below, so that
 only runs are refused that cannot fit; one that nevertheless outgrows the memory stops and keeps what it has.
@@ -42,7 +42,7 @@ ROUND = (1, 2, 5)
 
 
 class Work(NamedTuple):
-    """What a run has to do, about: segments at most, and how long vehicle and cable take in all [µs]."""
+    """An estimate of the work of a run: segments at most, and how long vehicle and cable take in all [µs]."""
 
     segments: int
     hull: float
@@ -55,7 +55,7 @@ MICROSECONDS_A_SEGMENT = 10.0
 
 
 def work_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Work:
-    """Return what a run has to do, about."""
+    """Return an estimate of the work of a run."""
     segments, rows = most_segments(trial, model) if tethered else 0, trial.duration / trial.cable_step
     hull = MICROSECONDS_A_HULL_STEP * trial.duration / trial.hull_step
     return Work(segments, hull, MICROSECONDS_A_SEGMENT * rows * segments)
@@ -82,7 +82,7 @@ def segments_of(trial: scenarios.Trial, length: float) -> int:
 def with_fewer_results(trial: scenarios.Trial, model: Model, tethered: bool) -> scenarios.Trial:
     """Return a trial that keeps as many results as take `MOST_KEPT`, if it leaves open how many it wants (`every` 0).
 
-    One whose results take less, and one that says how many it wants, stays as it is.
+    A trial whose results take less, or that states how many it wants, is not changed.
     """
     if trial.every > 0.0:
         return trial
@@ -95,7 +95,7 @@ def with_fewer_results(trial: scenarios.Trial, model: Model, tethered: bool) -> 
 
 
 def thinning_notice(trial: scenarios.Trial) -> str:
-    """Return what a run tells whose results are fewer than there are steps, unasked."""
+    """Return the notice of a run that keeps fewer results than steps without being asked to."""
     step = f"{trial.cable_step:g}"
     return (
         f"Results are kept every {trial.every:g} s of this long run: all would take more than {MOST_KEPT / 1e6:g} MB. "
@@ -104,7 +104,7 @@ def thinning_notice(trial: scenarios.Trial) -> str:
 
 
 def bytes_of_results(trial: scenarios.Trial, model: Model, tethered: bool, rows: float) -> float:
-    """Return what so many results of a run take, about."""
+    """Return an estimate of the memory that so many results of a run take."""
     if not tethered:
         return rows * bytes_a_row()
     longest = max(
@@ -114,7 +114,7 @@ def bytes_of_results(trial: scenarios.Trial, model: Model, tethered: bool, rows:
 
 
 def refuse_what_cannot_fit(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> None:
-    """Raise a UserError if what a run keeps will not fit into memory."""
+    """Raise a UserError if the results of a run will not fit into memory."""
     rows = row_of(grid.times.size - 1, grid.stride) + 1.0
     size = COPIES * rows * bytes_a_row() + BYTES_OF_TRACE * grid.times.size
     if tethered:
@@ -122,7 +122,7 @@ def refuse_what_cannot_fit(trial: scenarios.Trial, model: Model, tethered: bool,
         nodes = [1 + segments_of(trial, length) for length in lengths]
         size += (
             rows * BYTES_A_NODE * (0.5 * sum(nodes) + max(nodes))
-        )  # the result has room for the most at all times
+        )  # the result is padded to the largest number of nodes at all times
     kept = f", kept every {trial.every:g} s," if grid.stride > 1 else ","
     refuse_unless_it_fits(
         size, f"'{trial.name}', {trial.duration:g} s in steps of {trial.cable_step:g} s{kept}", REMEDY
@@ -131,12 +131,12 @@ def refuse_what_cannot_fit(trial: scenarios.Trial, model: Model, tethered: bool,
 
 @cache
 def bytes_a_row() -> float:
-    """Return what a recording keeps of the vehicle at one time."""
+    """Return the memory of a recording for the vehicle at one time."""
     return float(sum(values.nbytes for values in new_recording(1, 0)))
 
 
 def fits_in_memory(nodes: int) -> bool:
-    """Say whether shapes of so many nodes in all can be kept, and made into a result."""
+    """Return whether shapes of so many nodes in all can be kept, and made into a result."""
     return fits(COPIES * BYTES_A_NODE * nodes)
 
 

@@ -1,4 +1,4 @@
-"""What the numbers of a run depend on, as digests: our sources and libraries, a trial, a model."""
+"""All that determines the numbers of a run, as digests: our sources and libraries, a trial, a model."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def trial_digest(trial: scenarios.Trial) -> str:
 
 
 def digest_of(value: Any) -> str:
-    """Return a digest of what JSON can hold, floats to the last bit."""
+    """Return a digest of a value that JSON can hold, floats to the last bit."""
     return hashlib.sha256(json.dumps(canonical(value), sort_keys=True).encode()).hexdigest()
 
 

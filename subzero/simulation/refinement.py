@@ -22,7 +22,7 @@ numbers on every machine. A run of an ill-posed problem takes ever more iteratio
 its refinement soon; then the last change is the error, and the run says that it is not resolved.
 
 That looks at the whole error, of segments, steps, slack and coupling alike, which an estimate inside a step does not: a
-cable that is bent sharply beside the drum errs in its segments only, and its steps look perfect.
+cable that is bent sharply near the drum errs in its segments only, and its steps look perfect.
 """
 
 from __future__ import annotations
@@ -55,11 +55,11 @@ START_ROWS, START_REFINEMENTS = 5, (4, 2)
 """Samples that belong to the start, and how much finer these are taken to see their error: half as fine where a run of
 a stiff cable does not get so far. [-]"""
 SMALLEST_FORCE = 1e-6
-"""Forces are compared with at least this: what is smaller means nothing. [N]"""
+"""Forces are compared with at least this: smaller ones have no meaning. [N]"""
 
 Progress = Callable[[float], None]
 Take = Callable[[scenarios.Trial, Grid, Progress | None], "Run"]
-"""(trial, its times and what is kept, progress) → a run."""
+"""(trial, its times and the rows to keep, progress) → a run."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,10 +70,10 @@ class Accuracy:
         force_error: of the force, as a share of its largest; infinite where another resolution could not go on. [-]
         change: largest change of the force from the resolution before to this one, after the start, as that share. [-]
         time: when it changes most. [s]
-        start_error: of the force in the first samples, beside a run that is finer still, as that share. [-]
+        start_error: of the force in the first samples, from a run that is finer still, as that share. [-]
         start_time: when that is largest. [s]
         halvings: how often steps and segments were halved.
-        rtol: what was asked for. [-]
+        rtol: the requested accuracy. [-]
         proof_error: change of the force to the finest run of a proof, as that share; 0 without a proof. [-]
         proof_time: when that is largest. [s]
         proof_finer: how many times as fine that run is; 0 without a proof.
@@ -96,7 +96,7 @@ class Accuracy:
 
     @property
     def converged(self) -> bool:
-        """Whether the error is what was asked for."""
+        """Whether the error is within the requested accuracy."""
         return self.force_error <= self.rtol
 
 
@@ -153,9 +153,9 @@ class Budget:
             take: makes a run.
             like: a run whose nodes are known.
             finer: how many times as fine as that the trial is; a run takes the square as long, or more.
-            trial: what is run; None beyond the limits of a trial.
-            grid: its times and what is kept.
-            progress: told the fraction that is done.
+            trial: the trial to run; None beyond the limits of a trial.
+            grid: its times and the rows to keep.
+            progress: called with the fraction that is done.
         """
         times = grid.times.size / like.all_times.size  # the start alone has few of them
         if trial is None or not self.allows(like, finer, times):
@@ -178,7 +178,7 @@ def run_converged(
         trial: a tethered one of the default scheme.
         take: makes a run.
         budget: of the finer runs; granted here.
-        progress: told the fraction that is done; it goes back where a run is repeated.
+        progress: called with the fraction that is done; it goes back where a run is repeated.
 
     Returns:
         the run, with rows at the times of the trial however fine it is; and its accuracy, None for one too short.
@@ -187,10 +187,13 @@ def run_converged(
     coarse_times = _every_other(times)
     coarser = resolved(trial, 2.0)
     whole = Grid(times, 1, trial.stride)
+    # Without a coarser run there is nothing to compare with.
     if coarser is None or coarse_times.size < 3:
         return take(trial, whole, progress), None
+    # The coarse run is there for its force alone, so its energies and shapes are not kept.
     coarse = _taken(take, coarser, _only_traced(coarse_times, 1), _share(progress, 0.0, 0.2))
     run = take(trial, whole, _share(progress, 0.2, 0.8))
+    # The budget depends on the work of the run as asked for, which is known only now.
     budget.grant(run)
     if coarse is None:
         return run, None
@@ -200,9 +203,11 @@ def run_converged(
             break
         grid = whole._replace(parts=2**halvings)
         fine = budget.spend(take, run, 2.0, resolved(trial, 0.5**halvings), grid, progress)
+        # A finer run that stops early does not replace one that reaches the end.
         if fine is None or (run.completed and not fine.completed):
             accuracy = dataclasses.replace(accuracy, budget_spent=budget.is_spent)
             break
+        # The finer run takes the place of the run; the one before is then the coarse one.
         run, change = fine, _after_start(run, fine)
         accuracy = _accuracy(trial, take, budget, run, change, halvings)
     return run, accuracy
@@ -217,7 +222,7 @@ def prove(
     budget: Budget,
     progress: Progress | None = None,
 ) -> Accuracy:
-    """Compare a run that is doubted with finer ones, up to `finest` times as fine; stop at what contradicts it.
+    """Compare a run that is doubted with finer ones, up to `finest` times as fine; stop at one that contradicts it.
 
     Args:
         trial: a tethered one of the default scheme.
@@ -225,18 +230,20 @@ def prove(
         run: of the trial, as `run_converged` gives it; of its recording, trace and iterations are needed.
         accuracy: of the run.
         finest: one of `PROOFS`.
-        budget: what `run_converged` has left of it.
-        progress: told the fraction that is done of each run.
+        budget: the budget left by `run_converged`.
+        progress: called with the fraction that is done of each run.
 
     Returns:
-        the accuracy with the error that was found, where all of them agree or one contradicts. The error stays as it
-        was where the budget does not allow the finest, as far as the one before tells, and where one of them is refused
-        or does not reach the end: that proves nothing.
+        the accuracy with the error that was found, where all of them agree or one contradicts. The error is not
+        changed where the budget does not allow the finest, as far as the one before shows, and where one of them is
+        refused or does not reach the end: that proves nothing.
     """
     latest, reached, worst, given = run, 1, 0.0, 2**accuracy.halvings
     for finer in PROOFS[: PROOFS.index(finest) + 1]:
+        # Proofs that the budget has allowed are kept, and the error is not changed.
         if not budget.allows(latest, finest / reached):
             break
+        # The finer run is sampled at the times of the run: their forces are compared there.
         grid = _only_traced(run.all_times, finer * given)
         fine = budget.spend(
             take, latest, finer / reached, resolved(trial, 1.0 / (finer * given)), grid, progress
@@ -248,6 +255,7 @@ def prove(
         accuracy = dataclasses.replace(
             accuracy, proof_error=found.size, proof_time=found.time, proof_finer=finer
         )
+        # A contradiction ends the proof: the change is then the error.
         if finer == finest or worst > accuracy.rtol:
             return dataclasses.replace(accuracy, force_error=worst)
     return accuracy
@@ -259,9 +267,10 @@ def _only_traced(times: np.ndarray, parts: int) -> Grid:
 
 
 def _taken(take: Take, trial: scenarios.Trial, grid: Grid, progress: Progress | None) -> Run | None:
-    """Return a run beside the one that was asked for; None where it is refused, for memory or a start that fails."""
+    """Return a run other than the requested one; None where it is refused, for memory or a start that fails."""
     try:
         return take(trial, grid, progress)
+    # A refusal, such as for memory, is a user's error elsewhere; here it means that no comparison is possible.
     except UserError:
         return None
 
@@ -288,11 +297,12 @@ def _every_other(times: np.ndarray) -> np.ndarray:
 def _accuracy(
     trial: scenarios.Trial, take: Take, budget: Budget, run: Run, change: Change, halvings: int
 ) -> Accuracy:
-    """Return the accuracy of a run; `change` is what the last halving brought.
+    """Return the accuracy of a run; `change` is that of the last halving.
 
     A run that will be repeated anyhow needs no look at its start.
     """
     fine_enough = change.size <= trial.rtol or not budget.allows(run, 2.0) or halvings == MOST_HALVINGS
+    # The start is checked only if no finer run follows, whose start would be checked again.
     start = _start(trial, take, budget, run, halvings) if fine_enough else Change(size=0.0, time=0.0)
     return Accuracy(
         force_error=max(change.size, start.size),
@@ -313,7 +323,7 @@ def _after_start(coarse: Run, fine: Run) -> Change:
 
 
 def _start(trial: scenarios.Trial, take: Take, budget: Budget, run: Run, halvings: int) -> Change:
-    """Return what finer steps and segments change in the first samples; nothing where no finer run gets so far."""
+    """Return the change by finer steps and segments in the first samples; 0 where no finer run gets so far."""
     times = run.all_times[: START_ROWS + 1]
     for finer in START_REFINEMENTS if times.size > 1 else ():
         grid = _only_traced(times, finer * 2**halvings)
@@ -329,6 +339,7 @@ def _change(run: Run, fine: Run, first: int, largest: float) -> Change:
     The force of time 0 is a guess. Forces are compared with the `largest` of the run. [N]
     """
     rows = np.searchsorted(fine.all_times, run.all_times - 1e-9)
+    # Rows before `first` belong to the start, or to time 0, where the force is a guess.
     here = (rows < fine.all_times.size) & (rows >= first)
     if not here.any():
         return Change(size=0.0, time=0.0)
@@ -339,7 +350,7 @@ def _change(run: Run, fine: Run, first: int, largest: float) -> Change:
 
 
 def _largest(run: Run) -> float:
-    """Return the largest force of a run, at least what means something. [N]."""
+    """Return the largest force of a run, but at least `SMALLEST_FORCE`. [N]."""
     return max(float(np.linalg.norm(run.recording.trace[:, :3], axis=1).max()), SMALLEST_FORCE)
 
 
@@ -349,7 +360,7 @@ def _mean_nodes(run: Run) -> float:
 
 
 def _iterated(run: Run) -> float:
-    """Return nodes times iterations of Newton's method of a run: what it took, half a microsecond each. [-]"""
+    """Return nodes times iterations of Newton's method of a run: its work, half a microsecond each. [-]"""
     return float(run.recording.iterations[-1]) * _mean_nodes(run)
 
 

@@ -81,12 +81,12 @@ def simulate(
             `subzero.simulation.memory_estimate.MOST_KEPT`; ``attrs["thinned"]`` then says so.
         checkpoint: keeps where the run stands, now and then; the same call then goes on from there, and gives the same
             result, to the last bit.
-        progress: told the fraction that is done.
+        progress: called with the fraction that is done.
 
     Returns:
         one variable per channel of `subzero.channels`, the force breakdown, the cable's shape and tensions; units on
         every variable; scenario, parameters, versions and outcome as attributes. Look at ``attrs["outcome"]``: a run
-        that could not go on keeps what it has.
+        that could not go on keeps its results up to then.
 
     Raises:
         scenarios.ScenarioError: the scenario cannot be used.
@@ -137,7 +137,7 @@ def simulate_plainly(
 def _kept(
     checkpoint: Checkpoint | None, trial: scenarios.Trial, model: Model, tethered: bool, later: Later
 ) -> Iterator[Keeper | None]:
-    """Give what keeps the runs of a simulation, None without a checkpoint."""
+    """Return the keeper of the runs of a simulation, None without a checkpoint."""
     if checkpoint is None:
         yield None
         return
@@ -174,10 +174,10 @@ def simulate_many(
         tethered: with the cable.
         every: time between results that are kept, as of `simulate`. [s]
         workers: how many threads; one for each processor if not given.
-        progress: told the fraction that is done.
+        progress: called with the fraction that is done.
 
     Returns:
-        what `simulate` gives for each trial, in their order, the same to the last bit.
+        the results of `simulate` for each trial, in their order, the same to the last bit.
 
     Raises:
         UserError: the first trial that cannot be used; nothing is simulated then.
@@ -217,7 +217,7 @@ def _as_fine_as_asked(
 
 
 def _taker(model: Model, keeper: Keeper | None) -> Take:
-    """Return what makes a tethered run of a trial for `subzero.simulation.refinement`."""
+    """Return the function that makes a tethered run of a trial for `subzero.simulation.refinement`."""
     return lambda each, grid, reported: run_trial(each, model, True, reported, grid=grid, keeper=keeper)
 
 
@@ -234,12 +234,12 @@ def run_trial(
     """Run a trial with steps and segments as they are, in plain arrays.
 
     Args:
-        trial: what is run.
+        trial: the trial to run.
         model: vehicle, cable, drum and water.
         tethered: with the cable.
-        progress: told the fraction that is done.
+        progress: called with the fraction that is done.
         later: times of rows and the models that hold from them on.
-        grid: its times and what is kept; as the trial says when not given.
+        grid: its times and the rows to keep; by default those of the trial.
         keeper: keeps where the run stands, now and then, so that it can go on from there.
     """
     grid = Grid(trial.times(), 1, trial.stride) if grid is None else grid
@@ -250,7 +250,7 @@ def run_trial(
 
         return run_as_printed(trial, model, progress)
     kept = keeper.next_run() if keeper is not None else None
-    now = _begun(trial, model, tethered, grid)
+    now = _initial_run_state(trial, model, tethered, grid)
     now = kept.go_on(now) if kept is not None else now
     pace = Pace()
     while now.behind < grid.times.size and _goes_on(now, grid):
@@ -282,23 +282,23 @@ def run_trial(
 
 
 def _goes_on(now: RunState, grid: Grid) -> bool:
-    """Say whether a run can and may go on."""
+    """Return whether a run can and may go on."""
     return now.ending in (coupling.FINE, NO_ROOM) and not _took_too_long(now, grid)
 
 
 def _took_too_long(now: RunState, grid: Grid) -> bool:
-    """Say whether a run took more iterations than it may, however many rows were filled at a time."""
+    """Return whether a run took more iterations than it may, however many rows were filled at a time."""
     return bool(now.live.now.iterations > grid.iterations)
 
 
 ROOM = 64
-"""A run begins with room for so many segments beyond those in the water, more than `fig6` pays out: to enlarge it takes
-half a millisecond. [-]"""
+"""Segments allocated for a run at its start beyond those in the water, more than `fig6` pays out: to enlarge the
+arrays takes half a millisecond. [-]"""
 SPARE_NODES = 64
-"""A recording has room for twice the nodes that are expected, and so many more in each row. [-]"""
+"""A recording has space for twice the nodes that are expected, and so many more in each row. [-]"""
 
 
-def _begun(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> RunState:
+def _initial_run_state(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> RunState:
     """Return a run at its start, of which no row is written yet."""
     longest = float(np.diff(grid.times).max()) / grid.parts
     setup, live = prepare(trial, model, tethered, longest_exchange=longest, room=ROOM)
@@ -310,7 +310,7 @@ def _begun(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> 
 
 
 def _further(now: RunState, grid: Grid, last: int) -> RunState:
-    """Go on until `last` times are behind, or it cannot go on."""
+    """Go on until `last` times are done, or it cannot go on."""
     behind, used, ending = run_rows(
         now.setup, now.live, now.recording, grid.times, now.behind, last, now.used, grid.parts, grid.stride
     )
@@ -318,7 +318,7 @@ def _further(now: RunState, grid: Grid, last: int) -> RunState:
 
 
 def enlarged_run(live: Live, recording: Recording, used: int) -> tuple[Live, Recording]:
-    """Return the same run with twice the room for nodes."""
+    """Return the same run with space for twice as many nodes."""
     capacity = 2 * live.line.length.size
     nodes = 2 * max(recording.tension.size, used + 64 * capacity)
     larger = {}
@@ -336,12 +336,12 @@ NAMES = Names(
     rate="pay_out_rate_m_s",
     yielding='control = "constant_tension"',
 )
-"""What the settings of a cable are called in a trial file."""
+"""The names of the settings of a cable in a trial file."""
 WENT_WELL, GIVEN_UP = "The run reached its end.", "The run took more iterations than it may."
 
 
 def in_words(ending: int, time: float, setup: Setup, live: Live) -> str:
-    """Say how a run ended: when, where, and what to try."""
+    """Return how a run ended: when, where, and the advice."""
     if ending == coupling.FINE:
         return WENT_WELL
     if ending == coupling.CABLE_FAILED:

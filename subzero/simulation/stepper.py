@@ -51,9 +51,9 @@ WELL = (coupling.FINE, NO_ROOM)
 
 
 class Held(NamedTuple):
-    """A run: its arrays, times of its rows (n,) [s], where it stands (`subzero.engine.time_loop`), what is seen,
-    and the handle that machine code knows the arrays by. It is exchanged as a whole: an interrupt finds the old one
-    or the new one.
+    """A run: its arrays, times of its rows (n,) [s], its position in time (`subzero.engine.time_loop`), its
+    observation, and the handle that machine code knows the arrays by. It is exchanged as a whole: an interrupt finds
+    the old one or the new one.
     """
 
     setup: Setup
@@ -79,21 +79,21 @@ class Held(NamedTuple):
 
 
 class CommandError(UserError, ValueError):
-    """A command that is not four finite numbers; the run stands where it was."""
+    """A command that is not four finite numbers; the run does not advance."""
 
 
 class RunStoppedError(UserError):
-    """The simulation cannot go on: when, where, what to try. `Simulator.result` keeps what it has."""
+    """The simulation cannot go on: when, where, the advice. `Simulator.result` keeps the results up to then."""
 
 
 class Simulator:
     """A run that waits for the next command.
 
     Attributes:
-        trial: what is simulated; it goes on beyond the trial's duration if asked to.
+        trial: the trial to simulate; the run goes on beyond its duration if asked to.
         model: vehicle, cable, drum and water.
         sample_time: how long a step lasts. [s]
-        observation: what is true now.
+        observation: the true values now.
     """
 
     @checked_arguments
@@ -124,7 +124,7 @@ class Simulator:
         self.reset()
 
     def reset(self) -> Observation:
-        """Go back to the start, and return what is true there."""
+        """Return to the start; return the observation there."""
         setup, live = prepare(self.trial, self.model, self._tethered)
         setup = setup._replace(orders=Orders(np.zeros(1), np.zeros((1, 4))))
         setup.orders.values[0] = self._command_at(0.0)
@@ -140,7 +140,7 @@ class Simulator:
 
     @property
     def observation(self) -> Observation:
-        """What is true now."""
+        """The true values now."""
         return Observation(*self._held.seen.tolist())
 
     @property
@@ -149,7 +149,7 @@ class Simulator:
         return float(self._held.seen[0])
 
     def step(self, command: Command | None = None) -> Observation:
-        """Hold a command for one sample time, and return what is true then.
+        """Hold a command for one sample time; return the observation after it.
 
         Args:
             command: propeller [rev/s], rudder, port and starboard stern-plane [rad]; None: what the scenario commands
@@ -204,7 +204,7 @@ class Simulator:
         )
 
     def _command_at(self, time: float) -> tuple[float, float, float, float]:
-        """Return what the scenario commands at a time [s]."""
+        """Return the command of the scenario at a time [s]."""
         commands = self.trial.commands
         if commands is None:
             return 0.0, 0.0, 0.0, 0.0
@@ -212,18 +212,18 @@ class Simulator:
         return n, rudder, port, starboard
 
     def _message(self) -> str:
-        """Say how the last step ended."""
+        """Return how the last step ended."""
         ending = int(self._held.at[ENDING])
         return WENT_WELL if ending in WELL else in_words(ending, self.time, self._held.setup, self._held.live)
 
     def _check_on(self) -> None:
-        """Refuse to go on where a step has failed."""
+        """Raise an error if a step has failed before."""
         if self._held.at[ENDING] not in WELL:
             raise RunStoppedError(self._message())
 
 
 def _with_rows(held: Held, goal: int) -> Held:
-    """Return a run with room for rows up to `goal`, and for twice as many as there were."""
+    """Return a run with space for rows up to `goal`, and for twice as many as there were."""
     old, times = held.recording, held.times
     rows = max(2 * times.size, goal + 1)
     new = new_recording(rows, old.tension.size)
@@ -241,7 +241,7 @@ def _times(trial: scenarios.Trial) -> np.ndarray:
 
 
 def _exchanges(trial: scenarios.Trial, sample_time: float | None, tethered: bool) -> int:
-    """Return the number of exchanges in a sample, or refuse what cannot be stepped."""
+    """Return the number of exchanges in a sample; raise an error for a trial that cannot be stepped."""
     if trial.motion is not None:
         raise UserError(
             f"'{trial.name}' prescribes its motion, so there is nothing to command. Use subzero.simulate."

@@ -4,11 +4,11 @@
 
     φ' = p + tan θ (q sin φ + r cos φ),   θ' = q cos φ − r sin φ,   ψ' = (q sin φ + r cos φ)/cos θ
 
-with the forces of `vehicle.derivative`. A control engineer's state: Euler angles for the quaternion (pitch stays
+with the forces of `vehicle.derivative`. A control engineer's state: Euler angles for the quaternion (pitch remains
 away from ±90°), a full battery, and no play in the linkages, which is an event and no differential equation.
 
-Trim needs more of propeller and fins: the vehicle without their limits, what a state demands of them beside those
-limits, and the commands that lead to a state.
+Trim needs more of propeller and fins: the vehicle without their limits, the demands of a state on them compared with
+those limits, and the commands that lead to a state.
 """
 
 from __future__ import annotations
@@ -130,7 +130,7 @@ def rate(
 
 
 class Demand(NamedTuple):
-    """What an actuator has to do, and the most it can: its name, both values, their unit for a message."""
+    """The demand on an actuator, and the most it can do: its name, both values, their unit for a message."""
 
     name: str
     value: float
@@ -139,7 +139,9 @@ class Demand(NamedTuple):
 
 
 def ideal(hull: Vehicle) -> Vehicle:
-    """Return a vehicle whose actuators know no limit, dead band, offset, play or sag; lags stay (none: `QUICKEST`)."""
+    """Return a vehicle whose actuators have no limit, dead band, offset, play or sag; lags remain (none:
+    `QUICKEST`).
+    """
 
     def servo(servo: Servo) -> Servo:
         free = {
@@ -162,14 +164,14 @@ def ideal(hull: Vehicle) -> Vehicle:
 
 
 def demands(hull: Vehicle, x: np.ndarray) -> list[Demand]:
-    """Return what a state (16,) asks of each actuator."""
+    """Return the demands of a state (16,) on each actuator."""
     propeller = Demand("propeller", abs(float(x[12])), fastest_propeller(hull, float(x[SURGE])), "rev/s")
     fins = zip(("rudder", "port stern-plane", "starboard stern-plane"), x[13:], servos(hull), strict=True)
     return [propeller] + [_fin_demand(name, float(angle), servo) for name, angle, servo in fins]
 
 
 def _fin_demand(name: str, angle: float, servo: Servo) -> Demand:
-    """Return what is asked of a fin: to stand at an angle [rad]; of one that is jammed, to leave its offset."""
+    """Return the demand on a fin: to stand at an angle [rad]; if it is jammed, to leave its offset."""
     if servo.lost_command == 1.0:
         return Demand(f"jammed {name}", degrees(abs(angle - servo.offset)), 1e-9, "degrees")
     return Demand(name, degrees(abs(angle)), degrees(servo.deflection_limit), "degrees")

@@ -1,4 +1,5 @@
-"""Trim: the steady motion that holds what is asked for, with the cable as a formula or as the cable itself.
+"""Trim: the steady motion that holds the requested speeds and turn, with the cable as a formula or as the cable
+itself.
 
 The formula is that of `subzero.steady_motion.trim_point`. Where the cable is heavy, or cuts the corner of a turn, the
 cable itself is pulled along the way that the tow point came, and hull and cable are solved in turn.
@@ -41,7 +42,7 @@ def trim(
         wet_length: cable in the water; its pull is taken as steady although it grows. [m]
         roll: φ, held by unlike stern-planes. [rad]
         cable: "formula", ½ρπdC_t U² S and friction along the way of the tow point; or "model", the cable itself,
-            pulled along a way of that length. (In a turn less of it stays in the water: it cuts the corner.)
+            pulled along a way of that length. (In a turn less of it remains in the water: it cuts the corner.)
 
     Raises:
         NoTrimError: there is none: which limit is hit, and how far one can go.

@@ -3,11 +3,11 @@
     ν'(n, δ_r, δ_e, δ_d, θ, v, w) = 0,   z' = depth rate,   (p, q, r) = J⁻¹ (0, 0, ψ')
 
 Seven equations, seven unknowns; the roll angle is asked for (0) and held by unlike stern-planes. Propeller and fins
-are solved for without their limits first, if need be in steps from straight level motion to what is asked for: so a
-motion that cannot be had is told with the limit that is in its way. Speeds are through the water; a uniform current
-only carries the track.
+are solved for without their limits first, if necessary in steps from straight level motion to the requested one: a
+motion that is impossible is then reported with the limit that excludes it. Speeds are through the water; a uniform
+current only carries the track.
 
-A motion that cannot be had is refused with what is in the way, and how far one can go (`NoTrimError`).
+A motion that is impossible is refused with the reason, and the largest motion that is possible (`NoTrimError`).
 
 The force of the cable in steady motion is (`SteadyPull`)
 
@@ -89,7 +89,7 @@ class SteadyPull:
 
 
 RESIDUAL = 1e-9
-"""What may be left of accelerations and depth rate. [m/s2, rad/s2, m/s]"""
+"""Tolerances of accelerations and depth rate. [m/s2, rad/s2, m/s]"""
 FARTHEST = 1.2
 """Fin and pitch angles beyond this are another balance than the one that is looked for. [rad]"""
 
@@ -127,7 +127,7 @@ class Asked:
     roll: float = 0.0
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be asked for."""
+        """Raise an error for a request that is not valid."""
         for field in fields(self):
             number = real(value := getattr(self, field.name))
             if number is None:
@@ -156,7 +156,7 @@ class Asked:
 
 @dataclass(frozen=True, kw_only=True)
 class Motion:
-    """What is asked for, of which hull (its numbers without limits), with which pull beyond the formula's."""
+    """The requested motion, of which hull (its numbers without limits), with which pull beyond the formula's."""
 
     asked: Asked
     numbers: VehicleNumbers
@@ -178,7 +178,7 @@ class Motion:
         return x
 
     def left(self, y: np.ndarray) -> np.ndarray:
-        """Return what is left of the seven equations."""
+        """Return the residual of the seven equations."""
         x = self.state(y)
         rates = rate(x, x[12:], self.numbers, self.pull.wrench(x[VELOCITY]) + self.extra)
         return np.append(rates[VELOCITY], rates[DEPTH] - self.asked.depth_rate)
@@ -270,7 +270,7 @@ class Trim:
 
 
 Pull = Callable[[np.ndarray, Asked], np.ndarray]
-"""(state (16,), what is asked for) → wrench of the cable (6,), body axes [N, N m]."""
+"""(state (16,), requested motion) → wrench of the cable (6,), body axes [N, N m]."""
 
 
 def steady_motion(model: Model, asked: Asked, pull_of: Pull | None = None) -> Trim:
@@ -279,7 +279,7 @@ def steady_motion(model: Model, asked: Asked, pull_of: Pull | None = None) -> Tr
     Args:
         model: vehicle and cable.
         asked: which motion.
-        pull_of: what the cable pulls in it, if not what the formula says.
+        pull_of: the pull of the cable in it, if not that of the formula.
 
     Raises:
         NoTrimError: there is none: which limit is hit, and how far one can go.
@@ -370,7 +370,7 @@ def _balanced(hull: Vehicle, motion: Motion) -> np.ndarray:
 
 
 def check_limits(hull: Vehicle, x: np.ndarray) -> None:
-    """Refuse a steady motion that some actuator cannot hold."""
+    """Raise an error for a steady motion that some actuator cannot hold."""
     beyond = [demand for demand in demands(hull, x) if demand.value > demand.limit]
     if beyond:
         said = "; ".join(

@@ -6,10 +6,10 @@
     >>> runs["heading"].dims
     ('member', 'time')
 
-A plan (`plan`) has points (`design`) and says what is kept of each run (`outcomes`). A job (`member`) runs any of its
-members anywhere. A schedule (`schedule`) hands them to an executor, of processes here (`workers`) or of a cluster, and
-a store (`store`) keeps what comes back. In the end one dataset is written (`result`), and looked at (`sensitivity`,
-`figures`). `api` does it all; the command is ``subzero sweep``.
+A plan (`plan`) has points (`design`) and the outcomes to keep of each run (`outcomes`). A job (`member`) runs any of
+its members anywhere. A schedule (`schedule`) hands them to an executor, of processes here (`workers`) or of a
+cluster, and a store (`store`) keeps what comes back. In the end one dataset is written (`result`), and looked at
+(`sensitivity`, `figures`). `api` does it all; the command is ``subzero sweep``.
 """
 
 from importlib import import_module

@@ -54,7 +54,7 @@ class SweepProgress:
 
 
 Progress = Callable[[SweepProgress], None]
-"""Told after every batch how far the sweep is."""
+"""Called after every batch with the progress of the sweep."""
 
 
 @checked_arguments
@@ -77,12 +77,12 @@ def sweep(
 
     Args:
         scenario: name of a shipped scenario, path of a scenario file, a trial, or a whole plan (`plan_sweep`).
-        parameters: their values, as of `plan_sweep`; none beside a plan, which has them.
+        parameters: their values, as of `plan_sweep`; not with a plan, which has them.
         out: folder that keeps the members. The same call with it goes on where another was killed; without one, nothing
             is kept.
         workers: processes on this machine, by default one for each of its cores; or a `concurrent.futures.Executor`.
         client: Dask client to run on instead.
-        progress: told after every batch how far it is.
+        progress: called after every batch with the progress.
         **how: `design`, `changes`, `kept`, `tethered`, `description`, as of `plan_sweep`.
 
     Returns:
@@ -138,7 +138,7 @@ def finished(
     progress: Progress | None = None,
     retry: bool = False,
 ) -> Iterator[Store]:
-    """Give the store of a sweep with all its members finished; what a former call has finished is not run again.
+    """Yield the store of a sweep with all its members finished; members finished by a former call are not run again.
 
     Args:
         plan: the sweep.
@@ -148,7 +148,7 @@ def finished(
         retry: run members again that failed.
 
     Raises:
-        UserError: as of `sweep`, or workers that cannot go on; what is finished is kept.
+        UserError: as of `sweep`, or workers that cannot go on; finished members are kept.
     """
     check_workers(workers)  # before there is a folder
     job, rows = plan.job, plan.points.values
@@ -165,12 +165,12 @@ def finished(
 
 
 class _Tally:
-    """Keeps members, and tells how far the sweep is."""
+    """Keeps members, and reports the progress of the sweep."""
 
     def __init__(self, store: Store, members: int, finished: int, progress: Progress | None) -> None:
         self._store, self._members, self._progress = store, members, progress
         self._finished, self._before = finished, finished
-        self._failed, self._begun = store.failures(), monotonic()
+        self._failed, self._started = store.failures(), monotonic()
         self._slowest, self._seconds = (-1, 0.0), 0.0
         self._report()
 
@@ -187,7 +187,7 @@ class _Tally:
     def _report(self) -> None:
         if self._progress is not None:
             count = self._finished - self._before
-            rate = count / max(monotonic() - self._begun, 1e-9)
+            rate = count / max(monotonic() - self._started, 1e-9)
             others = (self._seconds - self._slowest[1]) / max(count - 1, 1)
             from subzero.simulation.refinement import BUDGET_RATIO  # heavy, and there is no member without it
 
@@ -204,7 +204,9 @@ class _Tally:
 
 
 def deliver(plan: Plan, store: Store, folder: Path) -> Gathered:
-    """Write the dataset of a finished sweep to a folder, whole or not at all; return what is looked at."""
+    """Write the dataset of a finished sweep to a folder, whole or not at all; return the data for figures and
+    page.
+    """
     with tempfile.TemporaryDirectory(prefix=".subzero-", dir=folder) as hidden:
         found = write_result(store, plan.job, plan.points, plan.attributes, Path(hidden))
         for path in sorted(Path(hidden).iterdir()):
@@ -214,7 +216,7 @@ def deliver(plan: Plan, store: Store, folder: Path) -> Gathered:
 
 @contextmanager
 def _executor(workers: Any, members: int) -> Iterator[tuple[Executor, int]]:
-    """Give what runs members, and how many it runs at a time."""
+    """Yield the executor of the members, and the number that it runs at a time."""
     if isinstance(workers, Executor):
         yield workers, workers.count if isinstance(workers, WorkerPool) else cores()
     elif _is_client(workers):
@@ -229,7 +231,7 @@ def _executor(workers: Any, members: int) -> Iterator[tuple[Executor, int]]:
 
 
 def check_workers(workers: Any) -> None:
-    """Refuse what runs no members.
+    """Raise an error for workers that cannot run members.
 
     Raises:
         UserError: neither a number of processes, nor a Dask client, nor an executor.
@@ -246,7 +248,7 @@ def check_workers(workers: Any) -> None:
 
 
 def _is_client(workers: Any) -> bool:
-    """Say whether this is a Dask client; Dask itself need not be there."""
+    """Return whether this is a Dask client; Dask itself need not be installed."""
     return hasattr(workers, "get_executor") and hasattr(workers, "ncores")
 
 

@@ -38,7 +38,7 @@ DISTRIBUTION_KEYS = ("values", "from", "to", "count", "log", "normal")
 
 @dataclass(frozen=True, kw_only=True)
 class Spread:
-    """What values a parameter takes.
+    """The distribution of the values of a parameter.
 
     Attributes:
         name: of the parameter, dotted.
@@ -63,7 +63,7 @@ class Points:
         spreads: the parameters that change.
         values: (members, parameters), in the units of the files.
         design: its name.
-        samples: what was asked for: points, trajectories, or base points of Saltelli's scheme.
+        samples: number that was requested: points, trajectories, or base points of Saltelli's scheme.
         seed: of the points.
         unit: the same points in the unit cube, for a sensitivity; else empty.
     """
@@ -90,7 +90,7 @@ def spreads_of(trial: scenarios.Trial, parameters: Mapping[str, Any]) -> tuple[S
     """Return the spreads that a plan asks for; ``vehicle.*`` stands for all of that name that are declared.
 
     Raises:
-        UserError: a name that the trial does not have, or what is no spread.
+        UserError: a name that the trial does not have, or an invalid spread.
     """
     if not isinstance(parameters, Mapping) or not parameters:
         raise UserError(
@@ -106,7 +106,7 @@ def spreads_of(trial: scenarios.Trial, parameters: Mapping[str, Any]) -> tuple[S
 
 
 def _expanded(trial: scenarios.Trial, parameters: Mapping[str, Any]) -> Any:
-    """Give names and what is said of them, patterns such as ``vehicle.*`` spelt out."""
+    """Return names and their values, with patterns such as ``vehicle.*`` expanded."""
     for name, said in parameters.items():
         if not isinstance(name, str):
             raise UserError(f"A parameter is named {short(name)}. Allowed: a name such as 'cable.diameter'.")
@@ -232,7 +232,9 @@ def _normal(name: str, unit: str, numbers: Any) -> Spread:
 
 
 def _check_ends(trial: scenarios.Trial, spreads: tuple[Spread, ...]) -> None:
-    """Refuse a parameter whose least or greatest value the trial refuses; the tails of a normal one may fail later."""
+    """Raise an error for a parameter with an extreme value that the trial refuses; tails of a normal one may fail
+    later.
+    """
     for spread in spreads:
         for end in spread.levels or spread.ends:
             with_parameters(trial, {spread.name: end})
@@ -342,7 +344,7 @@ def _saltelli(spreads: tuple[Spread, ...], samples: int, seed: int) -> Made:
 
 
 def salib_problem(spreads: tuple[Spread, ...]) -> dict[str, Any]:
-    """Return what SALib takes: the unit cube, so that any distribution serves."""
+    """Return the problem in SALib's form: the unit cube, so that any distribution serves."""
     names = [spread.name for spread in spreads]
     return {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
 
@@ -392,7 +394,7 @@ class Design:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        """Refuse what is no design."""
+        """Raise an error if the fields do not form a design."""
         chosen(DESIGNS, self.kind, "design")
         object.__setattr__(self, "seed", whole("seed", self.seed))
         _samples(self.kind, self.samples)
@@ -405,7 +407,7 @@ def points_of(trial: scenarios.Trial, parameters: Mapping[str, Any], design: Des
     """Return the points of a plan.
 
     Args:
-        trial: what is swept.
+        trial: the trial to sweep.
         parameters: dotted name → spread, as this module says.
         design: which points.
 

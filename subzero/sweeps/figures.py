@@ -1,4 +1,4 @@
-"""What people look at when a sweep is done: bands over time, histograms, outcomes against parameters, what matters."""
+"""Figures of a finished sweep: bands over time, histograms, outcomes against parameters, main effects."""
 
 from __future__ import annotations
 
@@ -59,9 +59,9 @@ def draw_sweep(
 
     Args:
         points: its points.
-        job: what was run and kept.
-        found: what came of it.
-        effects: what matters.
+        job: the job that was run, with the outcomes that were kept.
+        found: the results.
+        effects: the main effects.
         title: above each.
         names: of those that are drawn, such as "bands", as far as there is something to show.
     """

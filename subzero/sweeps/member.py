@@ -31,7 +31,7 @@ LONGEST_REASON = 1000
 
 @dataclass(frozen=True, kw_only=True)
 class Member:
-    """What is kept of a member.
+    """The outcomes of a member that are kept.
 
     Attributes:
         index: its number in the sweep, from 0.
@@ -39,7 +39,7 @@ class Member:
         warnings: (check, message) of its run.
         scalars: (scalars,), NaN if it failed.
         channels: (channels, times), float32; NaN if it failed.
-        own: what a function of one's own returned, by name.
+        own: numbers that a function of one's own returned, by name.
         seconds: how long it took, which is no part of a result. [s]
         refinement_share: share of its work that runs with finer steps took. [-]
     """
@@ -56,12 +56,12 @@ class Member:
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """What a worker needs to run members.
+    """The data that a worker needs to run members.
 
     Attributes:
-        trial: what is swept, with all changes that hold for every member.
+        trial: the trial to sweep, with all changes that hold for every member.
         names: of the parameters that change.
-        outcomes: what is kept.
+        outcomes: the outcomes to keep.
         tethered: with the cable.
         code: digest of the sources that the sweep was planned with.
     """
@@ -92,7 +92,7 @@ class Job:
         return simulate_plainly(trial, tethered=self.tethered), {}
 
     def _seen(self, index: int, run: PlainRun, indices: dict[str, float], started: float) -> Member:
-        """Return what is kept of a run."""
+        """Return the outcomes of a run that are kept."""
         warned = tuple(
             (load["check"], load["message"]) for load in json.loads(run.attrs.get("warnings", "[]"))
         )

@@ -1,4 +1,4 @@
-"""What is kept of each run: scalars by name, channels on a common grid, and what a function of one's own returns.
+"""The outcomes kept of each run: scalars by name, channels on a common grid, and numbers of a function of one's own.
 
     "peak_speed_m_s", "energy.hull_loss_J", "diagnostics.closure_error_m"      the numbers of a run's summary
     "cable_tension.max", "heading.end", "surge_speed.mean"                     a channel and a statistic of it
@@ -89,7 +89,7 @@ DEFAULT_INTERVALS = 100
 @checked_arguments
 @dataclass(frozen=True, kw_only=True)
 class Kept:
-    """What is asked for of each run.
+    """The outcomes that are requested of each run.
 
     Attributes:
         scalars: names of numbers, such as ``peak_speed_m_s`` or ``cable_tension.max``; `DEFAULT_SCALARS` if not given.
@@ -109,7 +109,7 @@ AS_USUAL = Kept()
 
 @dataclass(frozen=True, kw_only=True)
 class Outcomes:
-    """What is kept of each run, checked.
+    """The outcomes that are kept of each run, checked.
 
     Attributes:
         scalars: names, as this module says.
@@ -135,16 +135,16 @@ class Outcomes:
         return math.floor(self.until / self.every + 1e-9) + 1 if self.channels else 0
 
     def digest(self) -> str:
-        """SHA-256 of all that says what is kept; of a function its code, not what it calls."""
+        """SHA-256 of all settings of the outcomes; of a function its code, not the functions it calls."""
         parts = (self.scalars, self.channels, self.every, self.until, text_of(self.function))
         return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 
 def outcomes_of(kept: Kept, duration: float) -> Outcomes:
-    """Return what is kept, checked.
+    """Return the outcomes to keep, checked.
 
     Args:
-        kept: what is asked for.
+        kept: the outcomes that are asked for.
         duration: of the nominal run. [s]
 
     Raises:
@@ -178,7 +178,7 @@ def _names(what: str, given: Any, default: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def _check_scalar(name: str) -> None:
-    """Refuse a name that no run has."""
+    """Raise an error for a name that no run has."""
     head, _, tail = name.rpartition(".")
     known = (
         name in SUMMARY
@@ -253,10 +253,10 @@ def channels_of(run: AnyRun, outcomes: Outcomes) -> np.ndarray:
 
 
 def own_numbers(run: PlainRun, function: Function | None) -> dict[str, float]:
-    """Return what a function of one's own makes of a run, labelled for it; numbers by name.
+    """Return the numbers that a function of one's own makes of a run, labelled for it; by name.
 
     Raises:
-        UserError: it returned what is no number, nor numbers by name.
+        UserError: it returned neither a number nor numbers by name.
     """
     if function is None:
         return {}
@@ -271,12 +271,12 @@ def own_numbers(run: PlainRun, function: Function | None) -> dict[str, float]:
 
 
 def name_of(function: Function) -> str:
-    """Return what a function is called."""
+    """Return the name of a function."""
     return getattr(function, "__qualname__", type(function).__name__)
 
 
 def text_of(function: Function | None) -> str:
-    """Return what a function does, as text that changes with its code, constants, defaults and closure.
+    """Return a description of a function, as text that changes with its code, constants, defaults and closure.
 
     What it calls is not looked at, and of an object that is no function only its name is.
     """

@@ -1,4 +1,4 @@
-"""``report.html`` of a sweep: in a few sentences what was varied, what came out and what matters; then all of it.
+"""``report.html`` of a sweep: in a few sentences the parameters, the outcomes and the main effects; then all of it.
 
 The tables are those of the terminal (`subzero.cli.write_sweep`), from the numbers of ``summary.json``.
 """
@@ -31,11 +31,11 @@ COLUMNS = {
     "mean": "mean",
     "standard_deviation": "deviation",
 }
-"""Statistics of a scalar, and what they are called."""
+"""Statistics of a scalar, and their names."""
 SHOWN_EFFECTS = 5
-"""So many parameters are told for each scalar. [-]"""
+"""Number of parameters that are named for each scalar. [-]"""
 IN_WORDS = 4
-"""So many parameters or scalars are told in a sentence of their own; the tables have all of them. [-]"""
+"""Number of parameters or scalars with a sentence of their own; the tables have all of them. [-]"""
 NOTHING = "–"
 LIBRARIES = ("numpy", "numba", "scipy", "xarray")
 
@@ -102,7 +102,7 @@ def what_matters(summary: Summary) -> Table:
 
 
 def warning_lines(summary: Summary) -> list[str]:
-    """Return what members' runs warn of."""
+    """Return the warnings of members' runs."""
     return [
         f"{count} of {summary['members']} members' runs warn of {check.replace('_', ' ')}."
         for check, count in summary["warnings"].items()
@@ -110,7 +110,7 @@ def warning_lines(summary: Summary) -> list[str]:
 
 
 def _effects(summary: Summary, scalar: str) -> list[Summary]:
-    """Return what moves a scalar, the greatest first."""
+    """Return the parameters that move a scalar, the one of greatest effect first."""
     return [row for row in summary["sensitivity"]["effects"] if row["scalar"] == scalar]
 
 
@@ -139,7 +139,7 @@ def _outcome(summary: Summary) -> list[Line]:
 
 
 def _answers(summary: Summary) -> list[Answer]:
-    """Return in words what was varied, what came out, and what matters."""
+    """Return in words the parameters, the outcomes and the main effects."""
     found = [Answer(question="What was varied", words=_varied(summary))]
     if summary["scalars"]:
         found.append(Answer(question="What came out", words=_outcome_lines(summary)))

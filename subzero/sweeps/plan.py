@@ -1,4 +1,4 @@
-"""What a sweep is, as one value: a trial, its points, what is kept; from Python, or from a TOML file.
+"""A sweep as one value: a trial, its points, the outcomes to keep; from Python, or from a TOML file.
 
     trial = "fig6"                          # a name, or a path from this file's folder
     design = "sobol"                        # see `subzero.sweeps.design`
@@ -62,7 +62,7 @@ class Plan:
     """A sweep, checked.
 
     Attributes:
-        job: what a worker needs.
+        job: the data that a worker needs.
         points: which members there are.
         description: one line.
         text: of the file that says so; empty without one.
@@ -74,7 +74,7 @@ class Plan:
     text: str = ""
 
     def manifest(self) -> dict[str, str]:
-        """Return what its members belong to: anything that could change a number, by its digest."""
+        """Return all settings that could change a number, some as digests, to recognise members of the sweep."""
         return {
             "trial": trial_digest(self.job.trial),
             "parameters": json.dumps(self.points.names),
@@ -86,7 +86,7 @@ class Plan:
 
     @property
     def attributes(self) -> dict[str, Any]:
-        """What a dataset says of where it is from; no clock, so that two are alike to the last bit."""
+        """The provenance attributes of a dataset; no clock, so that two are alike to the last bit."""
         return {
             "title": self.description,
             "scenario": self.job.trial.name,
@@ -99,7 +99,7 @@ class Plan:
 
 
 class Planned(TypedDict, total=False):
-    """What a sweep may be told besides its trial and parameters, see `plan_sweep`."""
+    """Settings of a sweep in addition to its trial and parameters, see `plan_sweep`."""
 
     design: Design
     changes: Mapping[str, float] | None
@@ -135,7 +135,7 @@ def plan_sweep(
             vehicle's or the cable's file declares; ``"vehicle.*"`` stands for all that have one.
         design: which points; every combination of the lists by default.
         changes: dotted name → value that holds for all members.
-        kept: what is kept of each run; the usual numbers and channels by default.
+        kept: outcomes to keep of each run; the usual numbers and channels by default.
         tethered: with the cable.
         description: one line.
 
@@ -220,7 +220,7 @@ def _trial_of(named: str, folder: Path) -> str | Path:
 
 
 def _dotted(table: Mapping[str, Any], above: str = "") -> dict[str, Any]:
-    """Return dotted names → what is said of them, whether the quotes were left out or not."""
+    """Return dotted names → their values, whether the quotes were left out or not."""
     found: dict[str, Any] = {}
     for key, inside in table.items():
         name = f"{above}{key}"
@@ -235,5 +235,5 @@ def _dotted(table: Mapping[str, Any], above: str = "") -> dict[str, Any]:
 
 
 def _has_spread(table: Mapping[str, Any]) -> bool:
-    """Say whether a table is a spread, and no section without quotes."""
+    """Return whether a table is a spread, and no section without quotes."""
     return any(key in DISTRIBUTION_KEYS for key in table)

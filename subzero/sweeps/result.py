@@ -39,15 +39,15 @@ COMPRESSION = 4
 TAKEN = ("member", "time", "failed", "reason", "warnings", "refinement_share")
 """Names of variables that no number of one's own may have."""
 MOST_DRAWN = 1000
-"""So many members are kept in memory for the bands of a figure: the rank of what is drawn as the median is then right
+"""Number of members kept in memory for the bands of a figure: the rank of the curve drawn as the median is then right
 within 1.6 %, that of the outer percentiles within 0.7 % (one standard deviation)."""
 RANKS = (5.0, 25.0, 50.0, 75.0, 95.0)
-"""Percentiles that are told and drawn."""
+"""Percentiles that are reported and drawn."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gathered:
-    """What is looked at when a sweep is done: all scalars, channels of some members, and what was warned of.
+    """Data for figures and page when a sweep is done: all scalars, channels of some members, and the warnings.
 
     Attributes:
         names: of the scalars, those of one's own behind the others.
@@ -67,7 +67,7 @@ class Gathered:
 def write_result(
     store: Store, job: Job, points: Points, attributes: dict[str, Any], folder: Path
 ) -> Gathered:
-    """Write the dataset and the table of all members, and return what is looked at.
+    """Write the dataset and the table of all members, and return the data for figures and page.
 
     Args:
         store: where every member is finished.
@@ -194,7 +194,7 @@ def _variable(
 def _gather(
     block: list[Member], found: Gathered, own: tuple[str, ...], drawn: np.ndarray, place: np.ndarray
 ) -> None:
-    """Note what is looked at of some members."""
+    """Add the data of some members for figures and page."""
     for column in block:
         numbers = [column.own.get(name, np.nan) for name in own]
         found.scalars[column.index] = np.concatenate([column.scalars, numbers])
@@ -230,7 +230,7 @@ def _table_row(member: Member, points: Points, found: Gathered) -> Iterable[str]
 
 
 def percentiles(found: Gathered) -> dict[str, dict[str, float]]:
-    """Return what is told of every scalar, of members that did not fail: percentiles, mean, deviation, extremes."""
+    """Return statistics of every scalar, of members that did not fail: percentiles, mean, deviation, extremes."""
     reported = {}
     for name, column in zip(found.names, found.scalars.T, strict=True):
         values = column[np.isfinite(column)]

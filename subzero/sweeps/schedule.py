@@ -1,4 +1,4 @@
-"""Hand the members of a sweep to an executor in batches, and keep what comes back.
+"""Submit the members of a sweep to an executor in batches, and keep the results.
 
 A batch takes about `BATCH_S`, so that handing it out costs little, and less towards the end, so that no worker waits
 for another. Only a few batches are under way at a time, so memory does not grow with the number of members. Where a
@@ -44,7 +44,7 @@ class Batch:
 
 @dataclass
 class Schedule:
-    """What is still to be done, and what is under way.
+    """The batches still to be done, and those in progress.
 
     Attributes:
         job: the sweep.
@@ -80,7 +80,7 @@ class Schedule:
                 future.cancel()
 
     def _fill(self, executor: Executor) -> bool:
-        """Hand out batches as long as there is room; return whether anything is under way."""
+        """Submit batches as long as there is capacity; return whether any is in progress."""
         while len(self._under_way) < AHEAD * self.workers and (batch := self._batch()) is not None:
             try:
                 future = executor.submit(

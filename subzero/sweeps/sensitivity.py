@@ -1,4 +1,4 @@
-"""What matters: how much each parameter moves each scalar, by the method that the design of the sweep allows.
+"""Sensitivity: how much each parameter moves each scalar, by the method that the design of the sweep allows.
 
 morris        mu_star, the mean size of its elementary effects, and their deviation sigma (Morris 1991, Campolongo 2007)
 saltelli      Sobol indices, its share of the variance alone (first order) and with all others (total)  (Saltelli 2010)
@@ -49,7 +49,7 @@ CORRELATION = ("Spearman's rank correlation", "correlation", "")
 
 
 def description_of(design: str) -> tuple[str, str, str]:
-    """Return what a design's sensitivity is called, and its two numbers."""
+    """Return the name of a design's sensitivity, and its two numbers."""
     return METHODS.get(design, CORRELATION)
 
 
@@ -100,8 +100,8 @@ def _correlations(points: Points, name: str, values: np.ndarray) -> list[Effect]
 
 
 def _ranks(values: np.ndarray) -> np.ndarray:
-    """Return the rank of each value (n,) from 1, equal ones sharing the mean: what `scipy.stats.rankdata` does, whose
-    import takes longer than all else that is told of a sweep.
+    """Return the rank of each value (n,) from 1, equal ones sharing the mean, as `scipy.stats.rankdata` does, whose
+    import takes longer than everything else that is computed for a sweep here.
     """
     _, which, counts = np.unique(values, return_inverse=True, return_counts=True)
     shared: np.ndarray = (np.cumsum(counts) - 0.5 * (counts - 1.0))[which]

@@ -1,4 +1,4 @@
-"""The file that keeps what members gave: SQLite, so that a kill at any moment costs at most what was not written yet.
+"""The file that keeps members' results: SQLite, so that a kill at any moment costs at most those not written yet.
 
 Members come in batches, each in one transaction: it is in the file as a whole, or not at all. A member's number is the
 key of its row, so none can be in it twice. The file of a sweep that is running is locked; another command with it is
@@ -35,7 +35,7 @@ CREATE TABLE IF NOT EXISTS members (
 );
 """
 COLUMNS = "member, reason, warnings, own, scalars, channels, seconds, refinement_share"
-"""Of a row, in the order of its digest, which stands behind them."""
+"""Of a row, in the order of its digest, which follows them."""
 OF_THE_DISK = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN)
 """Errors of SQLite that are no fault of the file."""
 BLOCK = 512
@@ -158,7 +158,7 @@ def opened(folder: Path, manifest: Mapping[str, str], shape: tuple[int, int]) ->
 
     Args:
         folder: where it is, or will be.
-        manifest: what the members belong to: what → its digest or text.
+        manifest: the settings that the members belong to: name → its digest or text.
         shape: channels and times of a member.
 
     Raises:
@@ -191,14 +191,14 @@ def opened(folder: Path, manifest: Mapping[str, str], shape: tuple[int, int]) ->
 
 
 def _check(connection: sqlite3.Connection) -> None:
-    """Refuse a file whose pages do not fit together, before any of them is used."""
+    """Raise an error for a file whose pages do not fit together, before any of them is used."""
     (found,) = connection.execute("PRAGMA quick_check(1)").fetchone()
     if found != "ok":
         raise sqlite3.DatabaseError(" ".join(str(found).split()))
 
 
 def _refuse_another(path: Path, known: Mapping[str, str], wanted: Mapping[str, str]) -> None:
-    """Refuse a file whose members belong to another sweep."""
+    """Raise an error for a file whose members belong to another sweep."""
     differ = [key for key in wanted if known and known.get(key) != wanted[key]]
     if differ:
         raise UserError(

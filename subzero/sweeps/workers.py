@@ -97,7 +97,8 @@ class WorkerPool(Executor):
 
 @contextmanager
 def _fresh_processes() -> Iterator[Callable[[], set[Any]]]:
-    """Let processes that are started in the block import no script of the user; give what returns them.
+    """Keep processes that are started in the block from importing the user's script; yield the function that returns
+    them.
 
     A script without ``if __name__ == "__main__"`` would start itself again in each.
     """

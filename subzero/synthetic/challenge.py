@@ -1,4 +1,4 @@
-"""Hide an effect in a record, drawn from a seed: every number from its tolerance, and what is hidden among them."""
+"""Hide an effect in a record, drawn from a seed: every number from its tolerance, and the effect among them."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
 SAMPLE_S = 0.1
 """Time between samples. [s]"""
 KIND_PROBABILITIES = {"none": 0.2, "single": 0.4, "sudden": 0.1, "pair": 0.15, "outside": 0.15}
-"""What is hidden, how often."""
+"""Kind of hidden effect → its probability."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Challenge:
-    """A record, the trial with the nominal model, what is true, and what is hidden."""
+    """A record, the trial with the nominal model, the true setting, and the hidden effects."""
 
     record: Record
     nominal: Setting
@@ -76,10 +76,10 @@ def challenge(
     """Return a record with something hidden in it, drawn from a seed; written to a folder if one is given.
 
     Args:
-        scenario: what is flown.
+        scenario: the scenario to fly.
         seed: draws everything.
         folder: for ``record.csv``, ``record.toml`` and the sealed answer.
-        kind: what to hide, one of KIND_PROBABILITIES; drawn if None.
+        kind: the kind of effect to hide, one of KIND_PROBABILITIES; drawn if None.
         spread: of the true numbers, in tolerances.
 
     Raises:
@@ -122,11 +122,11 @@ def _answer(
     scenario: str,
     seed: int,
 ) -> Answer:
-    """Return what is hidden, ready to be told."""
-    outside = hidden.outside
+    """Return the hidden effects as an answer in words."""
+    unmodelled = hidden.outside
     kind = (
         "outside"
-        if outside
+        if unmodelled
         else ("sudden" if hidden.starts else ("none", "single", "pair")[len(hidden.effects)])
     )
     named = {
@@ -137,11 +137,11 @@ def _answer(
     return Answer(
         kind=kind,
         names=hidden.names,
-        sentences=words + ((outside.sentence,) if outside else ()),
+        sentences=words + ((unmodelled.sentence,) if unmodelled else ()),
         deviations=named,
         starts=dict(hidden.starts),
-        axis=outside.axis if outside else "",
-        feature=outside.feature if outside else "",
+        axis=unmodelled.axis if unmodelled else "",
+        feature=unmodelled.feature if unmodelled else "",
         tolerances=dict(tolerances),
         scenario=scenario,
         seed=seed,
@@ -149,7 +149,7 @@ def _answer(
 
 
 def write(made: Challenge, folder: Path, scenario: str | Path | scenarios.Trial) -> None:
-    """Write the record with its commands, what is known of it, and the sealed answer."""
+    """Write the record with its commands, its metadata, and the sealed answer."""
     folder.mkdir(parents=True, exist_ok=True)
     _write_csv(made, folder / "record.csv")
     lines = [f"source = {json.dumps(made.record.source, ensure_ascii=False)}", 'surge_speed = "water"']

@@ -1,4 +1,5 @@
-"""What is planted in a record: deviations within tolerance, effects on top of them; and the record as sensors write it.
+"""Effects planted in a record: deviations within tolerance, effects on top of them; and the record as sensors write
+it.
 
 The truth comes from the other cable formulation (`reference_run`); noise is AR(1), with outliers, rounding and gaps.
 """
@@ -27,12 +28,12 @@ MAX_DRAWS = 1000
 
 @dataclass(frozen=True, kw_only=True)
 class Hidden:
-    """What is wrong with a vehicle.
+    """The faults of a vehicle.
 
     Attributes:
         effects: effect id → deviations, on top of what the tolerances draw.
         starts: effect id → when it begins, of those that begin in mid-run. [s]
-        outside: a force outside the catalogue.
+        outside: a force that is not in the catalogue.
     """
 
     effects: Deviations = field(default_factory=dict)
@@ -41,7 +42,7 @@ class Hidden:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names as a diagnosis tells them: ids, ``<id>@t`` for one that begins in mid-run, ``outside:<kind>``."""
+        """Names as in a diagnosis: ids, ``<id>@t`` for one that begins in mid-run, ``outside:<kind>``."""
         ids = tuple(f"{key}@t" if key in self.starts else key for key in self.effects)
         return ids + ((f"outside:{self.outside.name}",) if self.outside else ())
 
@@ -122,7 +123,7 @@ OUTLIER = (8.0, 25.0)
 
 @dataclass(frozen=True, kw_only=True)
 class SensorErrors:
-    """What sensors and their logger do to a true value.
+    """The errors that sensors and their logger add to a true value.
 
     Attributes:
         noise: channel → standard deviation in its display unit, or a factor on that of usual sensors.
@@ -163,7 +164,7 @@ def make_record(
     simulate: Simulate = simulate_reference,
     source: str = "simulated",
 ) -> Record:
-    """Return what is measured in a setting.
+    """Return the measurements of a setting.
 
     Args:
         setting: the truth.
@@ -171,7 +172,7 @@ def make_record(
         channels: names of `subzero.channels`.
         seed: of the noise.
         errors: noise, outliers and gaps.
-        simulate: what gives the truth.
+        simulate: the function that gives the truth.
         source: of the record, in words.
     """
     rng, channels = np.random.default_rng(seed), tuple(channels)

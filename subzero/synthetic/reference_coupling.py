@@ -27,7 +27,7 @@ NEARLY_AGREED_N = 1e-3
 """In the smallest piece of an exchange, they need not agree better than this. [N]"""
 SMALLEST_SHARE = 0.5**10
 RATE_STEP_S = 1e-4
-"""To tell how fast a winch's setpoint changes. [s]"""
+"""Time step of the difference that gives the rate of a winch's setpoint. [s]"""
 
 FINE, CABLE, NOT_AGREED = range(3)
 """How an exchange ended."""
@@ -38,7 +38,7 @@ class Led(NamedTuple):
 
     Attributes:
         ends: place and velocity, relative to the drum, at start and end (2, 6). [m], [m/s]
-        legs: what `cable.lumped.step` is led by (2, 15).
+        legs: inputs of the ends for `cable.lumped.step` (2, 15).
         matrix: I − ∂F_cable/∂F (3, 3).
         states: of the springs at the start of an exchange.
         history: pull of the cable, earth axes, its tension at the drum and its length, by rows (n, 5). [N], [m]
@@ -128,7 +128,7 @@ def _exchange(setup: Setup, live: Live, rope: Rope, led: Led, start: float, span
 
 @compiled
 def _learn(M: np.ndarray, gap: np.ndarray, before: np.ndarray, step: np.ndarray) -> None:
-    """Let M fit the last step, gap − before = −M step, and change it no more than that takes."""
+    """Update M so that it fits the last step, gap − before = −M step, with the smallest change of M."""
     square = step[0] * step[0] + step[1] * step[1] + step[2] * step[2]
     for i in range(3):
         error = before[i] - gap[i]

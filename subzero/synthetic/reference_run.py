@@ -1,4 +1,4 @@
-"""The truth of a setting by the other cable formulation, lumped masses and springs, and what sensors show of it.
+"""The truth of a setting by the other cable formulation, lumped masses and springs, and the readings of its sensors.
 
 Another cable (`cable.lumped`), another way to couple it (`reference_coupling`), finer steps, and sensors written
 independently of `hypothesis.configuration`. Only the hull is the same; without the cable it is the hull alone in finer
@@ -48,7 +48,9 @@ SHORT = 0.01
 
 
 def seen(setting: Setting, truth: Truth, times: np.ndarray, channels: Iterable[str]) -> dict[str, np.ndarray]:
-    """Return channel → what its sensor shows at times (n,), in the display unit; NaN behind the end of the truth."""
+    """Return channel → the readings of its sensor at times (n,), in the display unit; NaN after the end of the
+    truth.
+    """
     grid = truth.run.times
     out = {}
     for name in channels:
@@ -58,7 +60,7 @@ def seen(setting: Setting, truth: Truth, times: np.ndarray, channels: Iterable[s
 
 
 def _true(name: str, setting: Setting, truth: Truth) -> np.ndarray:
-    """Return what is true of a channel at the times of the run (n,), in its display unit."""
+    """Return the true values of a channel at the times of the run (n,), in its display unit."""
     r, scale = truth.run.recording, BY_NAME[name].scale
     if name in STATE:
         return scale * r.state[:, STATE[name]]
@@ -116,7 +118,7 @@ def _sensor(sensor: Sensing, grid: np.ndarray, truth: np.ndarray) -> np.ndarray:
 
 
 FASTEST = 2.0
-"""Room for cable is made for this speed. [m/s]"""
+"""Space for cable is allocated for this speed. [m/s]"""
 
 
 class NoTruthError(UserError):
@@ -125,7 +127,7 @@ class NoTruthError(UserError):
 
 @dataclass(frozen=True, kw_only=True)
 class Truth:
-    """What happened: the run of the hull, and of the cable the pull in earth axes (n, 3), drum tension, length (n,)."""
+    """The truth: the run of the hull, and of the cable the pull in earth axes (n, 3), drum tension, length (n,)."""
 
     run: Run
     pull: np.ndarray
@@ -142,7 +144,7 @@ def simulate_reference(
     segment_length: float = 0.25,
     hull_step: float = 0.01,
 ) -> dict[str, np.ndarray]:
-    """Return what the sensors of a setting would show, without noise, by the other formulation.
+    """Return the readings of the sensors of a setting, without noise, by the other formulation.
 
     Args:
         setting: of the trial.
@@ -153,7 +155,7 @@ def simulate_reference(
         hull_step: time step of the hull. [s]
 
     Returns:
-        channel → values (n,) in its display unit, NaN behind the end of the trial.
+        channel → values (n,) in its display unit, NaN after the end of the trial.
 
     Raises:
         NoTruthError: there is no run of this setting.

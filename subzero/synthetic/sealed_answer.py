@@ -1,4 +1,4 @@
-"""What is hidden in a challenge: told in words, and sealed, so that nobody reads it by accident."""
+"""The hidden effects of a challenge, in words, and sealed, so that they are not read by accident."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SEALED = "answer.sealed"
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """What is hidden.
+    """The hidden effects.
 
     Attributes:
         kind: one of `challenge.ODDS`.
@@ -32,9 +32,9 @@ class Answer:
         sentences: the same in words.
         deviations: effect id → parameter → deviation.
         starts: effect id → when it begins. [s]
-        axis, feature: of a force outside the catalogue.
+        axis, feature: of a force that is not in the catalogue.
         tolerances: effect id → deviations that were drawn within the tolerances.
-        scenario, seed: what was asked for.
+        scenario, seed: the arguments of the challenge.
     """
 
     kind: str
@@ -73,7 +73,7 @@ def _size(cause: str, parameter: str, deviation: float) -> str:
 
 
 def seal(answer: Answer) -> str:
-    """Return an answer that nobody reads by accident, with its hash."""
+    """Return an encoded answer that cannot be read by accident, with its hash."""
     text = json.dumps(asdict(answer)).encode()
     packed = base64.b64encode(zlib.compress(text)).decode()
     return json.dumps({"sha256": hashlib.sha256(text).hexdigest(), "sealed": packed}, indent=1) + "\n"
@@ -81,7 +81,7 @@ def seal(answer: Answer) -> str:
 
 @checked_arguments
 def reveal(folder: str | Path) -> Answer:
-    """Return what is hidden in the record of a folder.
+    """Return the hidden effects in the record of a folder.
 
     Raises:
         UserError: there is no sealed answer, or it has been changed.
@@ -114,7 +114,7 @@ def _unsealed(data: bytes) -> Answer:
     said: dict[str, Any] = json.loads(text, parse_constant=_refused, parse_float=_finite, parse_int=_whole)
     said |= {key: tuple(map(str, said[key])) for key in ("names", "sentences")}
     answer = Answer(**said)
-    str(answer)  # what cannot be told is no answer
+    str(answer)  # raises an error for an answer that cannot be put into words
     return answer
 
 

@@ -1,7 +1,7 @@
-"""Forces that happen to vehicles and are in no catalogue, to plant in a record: none that a cause can name.
+"""Unmodelled forces that act on vehicles and are in no catalogue, to plant in a record: no cause can name them.
 
 Each kind draws its size and times, and says which axis it acts on and, where there is one, which feature of
-`subzero.external_force` its formula has. Sizes are told in the drag of the hull at 1 m/s, so they fit any vehicle.
+`subzero.external_force` its formula has. Sizes are shares of the drag of the hull at 1 m/s, so they fit any vehicle.
 
 To add a kind: a function (draw) → `UnmodelledForce`, and a line in KINDS.
 """
@@ -20,11 +20,11 @@ from subzero.synthetic.reference_run import Truth
 
 @dataclass(frozen=True, kw_only=True)
 class UnmodelledForce:
-    """A force outside the catalogue.
+    """A force that is not in the catalogue.
 
     Attributes:
         name: of its kind.
-        sentence: what happened.
+        sentence: its description.
         axis: where it acts, at most.
         feature: of its formula, "" for one that is a function of time alone.
         missing: the force.
@@ -50,7 +50,7 @@ class UnmodelledForce:
 
 
 def force_along(outside: UnmodelledForce, setting: Setting, truth: Truth) -> np.ndarray:
-    """Return the force (n, 6) at the times of a truth of the setting: what a diagnosis should recover. [N, N m]"""
+    """Return the force (n, 6) at the times of a truth of the setting, which a diagnosis should recover. [N, N m]"""
     times, factors = truth.run.times, factors_of(setting, truth)
     total = history_at(outside.missing, times)
     for term in outside.missing.terms:
@@ -85,7 +85,7 @@ HISTORY_STEP_S = 0.1
 
 @dataclass(frozen=True)
 class Draw:
-    """What a kind draws from: a generator, duration of the trial [s], drag of the hull at 1 m/s [N], its length [m]."""
+    """The inputs of a draw: a generator, duration of the trial [s], drag of the hull at 1 m/s [N], its length [m]."""
 
     rng: np.random.Generator
     duration: float
@@ -273,7 +273,7 @@ ALSO_CAUSES = {"leak": "flooding", "fouling_grows": "fouling"}
 def draw_unmodelled(
     setting: Setting, seed: int | np.random.Generator, kind: str | None = None
 ) -> UnmodelledForce:
-    """Return a force outside the catalogue, of a kind or of any."""
+    """Return a force that is not in the catalogue, of a given kind or of any."""
     rng, hull = np.random.default_rng(seed), setting.model.vehicle
     name = kind or str(rng.choice(list(KINDS)))
     force = abs(hull.numbers().axial_drag)

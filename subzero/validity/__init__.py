@@ -1,4 +1,4 @@
-"""What may be wrong with a run that has reached its end: `CHECKS`, each a pure function of the labelled result.
+"""Warnings about a run that has reached its end: `CHECKS`, each a pure function of the labelled result.
 
 A check takes a run, its trial and its model, and answers with sentences, none if all is well. A sentence says what, how
 much, since when, and what to do. They stand in ``attrs["warnings"]`` of the run (`warnings_of` reads them), in
@@ -69,6 +69,7 @@ class _Supposed:
     """A run with something else in its attributes."""
 
     def __init__(self, run: AnyRun, **attrs: str) -> None:
+        # A new mapping: the attributes of the run itself are not changed.
         self._run, self.attrs = run, run.attrs | attrs
 
     def __getitem__(self, name: str, /) -> Any:
@@ -78,17 +79,20 @@ class _Supposed:
 
 @checked_arguments
 def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -> int:
-    """Return how much finer a run would have to confirm the tow force so that no number is doubted any more.
+    """Return how much finer a run would have to confirm the tow force so that no doubt of a number remains.
 
-    0 if none is, if another doubt would be left all the same, if finer runs of the start contradict it already, or if
-    the run stopped. A cable of which nothing says how it leaves its drum, and an error that is close to what is
-    allowed, are no doubts yet, but looked at all the same.
+    0 if no number is doubted, if another doubt would remain anyway, if finer runs of the start contradict it already,
+    or if the run stopped. Two cases are not doubts yet, but are checked as well: a cable without a determined
+    direction at its drum, and an error that is close to the allowed one.
     """
+    # A finer run settles neither a run that stopped nor a start that finer runs have contradicted.
     if run.attrs["outcome"] != "completed" or starts_otherwise(run):
         return 0
+    # Without a doubt, finer runs are needed in the two cases only that are not doubts yet.
     if not {warning.check for warning in warnings_of(run)}.intersection(DOUBTS):
         return PROOF if only_just_fits(run) or is_left_open(run, trial, model) else 0
     for finer in sorted({PROOF, DRUM_PROOF}):
+        # Suppose that the finer run agrees: the doubts that then remain cannot be settled by it.
         proved = json.loads(run.attrs["accuracy"]) | {"force_error": 0.0, "proof_finer": finer}
         supposed = _Supposed(run, accuracy=json.dumps(proved))
         if not any(CHECKS[check](supposed, trial, model) for check in DOUBTS):
@@ -99,12 +103,13 @@ def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -
 @checked_arguments
 def warnings_of(run: AnyRun) -> tuple[RunWarning, ...]:
     """Return the warnings that a run carries in its attributes; none from a version that did not know them."""
+    # Older versions did not save warnings; their runs have none.
     reported = json.loads(run.attrs.get("warnings", "[]"))
     return tuple(RunWarning(each["check"], each["message"]) for each in reported)
 
 
 def as_json(warnings: list[RunWarning]) -> str:
-    """Return warnings as they stand in the attributes of a run."""
+    """Return warnings as JSON, as in the attributes of a run."""
     return json.dumps([warning._asdict() for warning in warnings], ensure_ascii=False)
 
 
@@ -124,6 +129,6 @@ CHECKS: dict[str, Check] = {
     "actuators": actuators,
     "unstable_pitch": unstable_pitch,
 }
-"""Name → check; the names stand in ``summary.json`` and in the attributes of a run."""
+"""Name → check; the names are those in ``summary.json`` and in the attributes of a run."""
 DOUBTS = ("energy_residual", "resolution", "tow_force", "ill_posed_drum", "slack", "closure", "push")
 """Those that doubt the numbers; the others say what happened."""

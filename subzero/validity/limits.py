@@ -1,4 +1,4 @@
-"""Where the equations do not hold, or what was asked for cannot be: air, sea bed, strength, bends, actuators, pitch.
+"""Where the equations do not hold, or a command is impossible: air, sea bed, strength, bends, actuators, pitch.
 
 Also the words for when and for how long, which all warnings share.
 """
@@ -23,6 +23,7 @@ def longest_span(time: np.ndarray, holds: np.ndarray) -> tuple[float, float]:
     """Return how long something holds at a stretch, at most, and when that stretch begins. [s]."""
     if not holds.any():
         return 0.0, 0.0
+    # The sentinels at both ends make every stretch begin and end inside the array.
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(int)))
     begin, end = edges[::2], edges[1::2] - 1
     spans = time[end] - time[begin]
@@ -48,7 +49,7 @@ MOST_OF_THE_RUN, LONG, SHORT = 0.9, 10.0, 2.0
 """At a limit throughout: for more than this share of the run, or for longer than this at a stretch; a shorter stretch
 than the last is none: an actuator takes its time. [-], [s], [s]"""
 BEHIND = 0.95
-"""A propeller slower than this share of its command is behind it. [-]"""
+"""A propeller slower than this share of its command lags it. [-]"""
 FINS = {
     "rudder": "rudder_servo",
     "stern_plane_port": "stern_plane_port_servo",
@@ -58,22 +59,22 @@ FINS = {
 
 
 def above_surface(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
-    """Vehicle or cable in the air, where the equations know only water."""
+    """Return warnings of a vehicle or cable in the air, where the equations are those of water."""
     radius = 0.5 * model.vehicle.hull.diameter
     words = "though the equations know only water: what follows is wrong. Start deeper, or command less."
-    return _outside(run, model, lambda depth: -depth - radius, "above the surface", words)
+    return _out_of_bounds(run, model, lambda depth: -depth - radius, "above the surface", words)
 
 
 def below_sea_bed(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
-    """Vehicle or cable below the sea bed that the trial tells."""
+    """Return warnings of a vehicle or cable below the sea bed of the trial."""
     if trial.sea_bed <= 0.0:
         return []
     words = "which no equation knows: nothing holds it up there. Change the trial, or water.sea_bed_m."
     where = f"below the sea bed at {trial.sea_bed:g} m"
-    return _outside(run, model, lambda depth: depth - trial.sea_bed, where, words)
+    return _out_of_bounds(run, model, lambda depth: depth - trial.sea_bed, where, words)
 
 
-def _outside(
+def _out_of_bounds(
     run: AnyRun, model: Model, beyond: Callable[[np.ndarray], np.ndarray], where: str, words: str
 ) -> list[str]:
     """Return sentences about vehicle and cable where `beyond` of their depth is above zero [m]."""
@@ -81,6 +82,7 @@ def _outside(
     places = {"vehicle": (run["depth"].values[:, None], 0.0)}
     if run.attrs["tethered"] and run["node_count"].values.any():
         down = run["cable_position"].values[:, :, 2]
+        # Places of the cable are relative to the drum; the depth of the tow point at the start fixes their zero.
         places["cable"] = down, _depth_of_start(run, model) - down[0, 0]
     for name, (down, offset) in places.items():
         farthest = np.concatenate([_farthest(beyond, down[block] + offset) for block in blocks_of(time.size)])
@@ -154,6 +156,7 @@ def bend_radii(run: AnyRun) -> np.ndarray:
     side = np.diff(P, axis=1)
     a, b = side[:, :-1], side[:, 1:]
     aa, bb, ab = (np.einsum("tni,tni->tn", each, two) for each, two in ((a, a), (b, b), (a, b)))
+    # c = a + b, so the product of the three sides is √(a² b² (a² + b² + 2 a·b)).
     product = np.sqrt(aa * bb * (aa + bb + 2.0 * ab))
     square = aa * bb - ab * ab
     pulls = np.minimum(np.minimum(T[:, :-2], T[:, 1:-1]), T[:, 2:]) > TAUT
@@ -170,10 +173,11 @@ def actuators(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
 
 
 def _fin(run: AnyRun, model: Model, fin: str) -> list[str]:
-    """Return what is wrong with a fin: cut off, at its limit, or turning as fast as it can all the time."""
+    """Return the warnings of a fin: cut off, at its limit, or turning as fast as it can all the time."""
     time, servo = run["time"].values, getattr(model.vehicle, FINS[fin])
     command, angle = run[f"{fin}_command"].values, run[f"{fin}_angle"].values
     name, limit = fin.replace("_", " "), servo.deflection_limit * DEGREE
+    # A command inside the dead band does not move the fin; beyond it, the band is subtracted.
     moved = np.sign(command) * np.maximum(np.abs(command) - servo.dead_band * DEGREE, 0.0)
     cut = np.abs(moved + servo.offset * DEGREE) - limit
     said, key = [], f"vehicle.{FINS[fin]}"
@@ -183,6 +187,7 @@ def _fin(run: AnyRun, model: Model, fin: str) -> list[str]:
             f"The {name} is commanded to {command[worst]:.4g}° and goes to {limit:.4g}° ({key}.deflection_limit): up "
             f"to {cut[worst]:.3g}° are cut off, first at {first_time(time, cut > 1e-6):g} s. Command less."
         )
+    # A command that is cut off has been reported above: being at the limit is not a second fault.
     elif throughout := _throughout(time, (0.0 < limit < np.inf) & (np.abs(angle) >= 0.999 * limit)):
         said.append(
             f"The {name} is at its limit of {limit:.4g}° {throughout}: it has nothing left to steer with."
@@ -196,7 +201,7 @@ def _fin(run: AnyRun, model: Model, fin: str) -> list[str]:
 
 
 def _propeller(run: AnyRun, model: Model) -> list[str]:
-    """Return what is wrong with the propeller: asked for too much, or behind its command."""
+    """Return the warnings of the propeller: a command above its limit, or a speed that lags its command."""
     time, c = run["time"].values, model.vehicle.motor.speed_per_volt
     command, speed = run["propeller_command"].values, run["propeller_speed"].values
     most = c * model.vehicle.battery.full_voltage
@@ -206,6 +211,7 @@ def _propeller(run: AnyRun, model: Model) -> list[str]:
             f"The propeller is commanded to {command[worst]:.4g} rev/s, and the full battery drives it at "
             f"{most:.4g} rev/s at most (first at {first_time(time, np.abs(command) > most):g} s). Command less."
         ]
+    # With the sign of the command, a propeller that turns the wrong way counts as lagging, too.
     behind = np.sign(command) * speed < BEHIND * np.abs(command)
     spun_up = 10.0 * model.vehicle.motor.lag
     if throughout := _throughout(time, behind, max(SHORT, spun_up)):
@@ -218,7 +224,7 @@ def _propeller(run: AnyRun, model: Model) -> list[str]:
 
 
 def _throughout(time: np.ndarray, at_limit: np.ndarray, short: float = SHORT) -> str:
-    """Say for how long a limit holds, if it is most of the run or a long stretch, and not a short one [s]."""
+    """Return for how long a limit holds, if it is most of the run or a long stretch, and not a short one [s]."""
     longest, begin = longest_span(time, at_limit)
     if longest > max(LONG, short):
         return f"from {begin:g} s on for {longest:.3g} s"
@@ -235,6 +241,7 @@ def unstable_pitch(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     if not steep.any():
         return []
     planes = np.stack([run[f"stern_plane_{side}_command"].values for side in ("port", "starboard")])
+    # The planes have been held since the last change of their command before the pitch became steep.
     row = int(np.argmax(steep))
     moved = np.flatnonzero(np.any(np.diff(planes[:, : row + 1]) != 0.0, axis=0))
     since, speed = (
@@ -242,6 +249,7 @@ def unstable_pitch(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
         float(run["surge_speed"].values[row]),
     )
     growth = pitch_growth(model, speed) if speed > 0.0 else 0.0
+    # Less time than one doubling: the pitch may be the result of the last command.
     if growth * (time[row] - since) < np.log(2.0):
         return []
     worst, deepest = pitch[np.abs(pitch).argmax()], float(run["depth"].values.max())
@@ -261,6 +269,7 @@ def pitch_growth(model: Model, speed: float) -> float:
     numbers, level = ideal(model.vehicle).numbers(), np.zeros(len(STATES))
     level[SURGE] = speed
     kept = [PLACE[name] for name in ("pitch", "heave_speed", "pitch_rate")]
+    # Central differences: their error is of second order.
     nudges = 1e-5 * np.eye(len(STATES))[kept]
     pairs = [
         rate(level + nudge, level[ACTUATORS], numbers) - rate(level - nudge, level[ACTUATORS], numbers)

@@ -29,7 +29,7 @@ PROOF, DRUM_PROOF = 4, 8
 """A run so many times as fine, and all that are coarser, have to confirm a force that is doubted; the second on a drum
 that does not hold its cable: a wave in it may be hidden from four times as many segments. [-]"""
 SLOWEST = 0.02
-"""Pay-out rates below this are none. [m/s]"""
+"""Pay-out rates below this count as zero. [m/s]"""
 LEAN = 0.03
 """A load across the cable of this share of its drag turns it by as many radians within the last m1 U²/(½ρπdC_t U²)
 metres before the drum; more counts where no wave comes back to the drum. [-]"""
@@ -45,7 +45,7 @@ SLACK_TIME = 1.0
 CLOSED = 0.01
 """A cable that ends farther from the tow point than this share of its length is not the cable of this vehicle. [-]"""
 PUSHED = 1e-3
-"""A cable that pushes harder than this share of its hardest pull is none. [-]"""
+"""A cable that pushes harder than this share of its hardest pull is not a cable. [-]"""
 ENERGIES = ("propeller_work", "hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term")
 
 
@@ -59,6 +59,7 @@ def energy_residual(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
         return []  # whatever moves the vehicle does unknown work
     residual = np.abs(run["energy_residual"].values)
     largest = float(np.abs([run[f"energy_{name}"].values for name in ENERGIES]).max())
+    # Residuals are compared with the largest energy: without one there is nothing to compare.
     if not (np.isfinite(residual).all() and np.isfinite(largest)) or largest < NO_ENERGY:
         return []
     share = residual / largest
@@ -77,11 +78,13 @@ def resolution(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
     `subzero.simulation.refinement`.
     """
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
+    # Without an accuracy no coarser run was made.
     if not accuracy or is_resolved(run):
         return []
     finer = f"({2 ** accuracy['halvings']} times as fine as given)"
     asked = f"run.rtol allows {percent(trial.rtol)}"
     start, change = _share(accuracy["start_error"]), _share(accuracy["change"])
+    # A contradiction by a finer run is the strongest evidence, so it is reported first.
     if accuracy["proof_error"] > trial.rtol:
         same = "" if change > trial.rtol else ", though with twice as long ones it is the same"
         return [
@@ -89,6 +92,7 @@ def resolution(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
             f"they change it by {_percent(accuracy['proof_error'])} (at {accuracy['proof_time']:g} s; {asked}){same}. "
             "Give the drum friction_torque or a [winch], or the cable bending_stiffness."
         ]
+    # An error in the start only has another cause, and another remedy.
     if start > max(trial.rtol, change):
         return [
             f"The tow force of the start depends on steps and segments: four times as fine as these {finer} they "
@@ -109,7 +113,9 @@ def resolution(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
 
 
 def _start_imbalance(run: AnyRun, trial: scenarios.Trial, model: Model) -> str:
-    """Return what moves or pulls at time 0 of a run, where a cable at rest is laid: ": the water by 0.3 m/s, …"."""
+    """Return the motions and forces at time 0 of a run, where a cable at rest is laid: ": the water by 0.3 m/s,
+    …".
+    """
     winch, vessel = model.winch, model.vessel
     flow = model.water().at((0.0, 0.0, trial.start.depth))
     speeds = {  # a cable that hangs is at rest in the current, one that is laid straight is not
@@ -126,7 +132,7 @@ def _start_imbalance(run: AnyRun, trial: scenarios.Trial, model: Model) -> str:
 
 
 def _share(number: float | None) -> float:
-    """Return a number of an accuracy; what is infinite stands as None in it."""
+    """Return a number of an accuracy; an infinite one is stored as None in it."""
     return np.inf if number is None else number
 
 
@@ -136,20 +142,20 @@ def _percent(share: float) -> str:
 
 
 def is_resolved(run: AnyRun) -> bool:
-    """Say whether a coarser run has confirmed the tow force of this one within its trial's rtol."""
+    """Return whether a coarser run has confirmed the tow force of this one within its trial's rtol."""
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
     error = accuracy.get("force_error")
     return error is not None and error <= accuracy["rtol"]
 
 
 def starts_otherwise(run: AnyRun) -> bool:
-    """Say whether finer runs of the start alone give another tow force there."""
+    """Return whether finer runs of the start alone give another tow force there."""
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
     return bool(accuracy) and _share(accuracy["start_error"]) > accuracy["rtol"]
 
 
 def is_proved(run: AnyRun, finer: int) -> bool:
-    """Say whether a run so many times as fine has confirmed the tow force, too."""
+    """Return whether a run so many times as fine has confirmed the tow force, too."""
     return is_resolved(run) and json.loads(run.attrs["accuracy"]).get("proof_finer", 0) >= finer
 
 
@@ -160,6 +166,7 @@ def tow_force(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
     """
     if not run.attrs["tethered"] or is_resolved(run):
         return []
+    # Second differences lose one sample at each end, and the force of time 0 is a guess.
     jump, time = roughness(run), run["time"].values[2:-1]
     for kink in model.winch.time[1:] if model.winch is not None and jump.size else ():
         jump = np.where(np.abs(time - kink) <= trial.cable_step * (1.0 + 1e-6), 0.0, jump)
@@ -183,9 +190,9 @@ def roughness(run: AnyRun) -> np.ndarray:
 def ill_posed_drum(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     """A free drum that does not hold its cable: nothing in the equations says how the cable leaves it.
 
-    One whose friction outweighs m1 U² does say: waves come back to it. A cable that unwinds there all the same is only
-    doubted as long as no coarser run has confirmed its force. Nor is one of which the segments do say it, all the same:
-    the error is found to be small (`DRUM_PROOF`).
+    If the friction outweighs m1 U², waves come back to the drum and determine it. A cable that unwinds there
+    nevertheless is only doubted as long as no coarser run has confirmed its force. Nor is a cable doubted whose
+    segments do determine it: the error is found to be small (`DRUM_PROOF`).
     """
     time, S = run["time"].values, run["cable_length"].values
     if not run.attrs["tethered"] or model.winch is not None or time.size < 3 or is_proved(run, DRUM_PROOF):
@@ -193,11 +200,13 @@ def ill_posed_drum(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     T, payout, away = run["drum_tension"].values, np.gradient(S, time), _tow_speed(run, time)
     ill = drum_is_ill_posed(T, payout, away, model.cable, model.drum)
     momentum = model.cable.virtual_mass_per_length * payout**2
+    # A confirmed force leaves the second case only: where m1 U² > T, no waves come back to the drum.
     if is_resolved(run):
         ill &= momentum > T
     longest, begin = longest_span(time, ill)
     if longest <= ILL_POSED_TIME:
         return []
+    # The worst sample is taken from the longest stretch, which the sentence is about.
     here = ill & (time >= begin) & (time <= begin + longest)
     worst = int(np.where(here, payout, -np.inf).argmax())
     return [
@@ -210,7 +219,8 @@ def ill_posed_drum(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
 
 
 def is_left_open(run: AnyRun, trial: scenarios.Trial, model: Model) -> bool:
-    """Say whether nothing determines how the cable leaves its free drum, so that a coarser run confirms too little.
+    """Return whether nothing determines how the cable leaves its free drum, so that a coarser run confirms too
+    little.
 
         T(S) < m1 U²,    |q⊥| > 0.03 ½ρπdC_t U²        q⊥: what water and weight do across the cable
 
@@ -222,6 +232,7 @@ def is_left_open(run: AnyRun, trial: scenarios.Trial, model: Model) -> bool:
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
     if model.winch is not None or not accuracy:
         return False
+    # The segments of the run after its halvings.
     cable, segment = model.cable, trial.segment_length / 2.0 ** accuracy["halvings"]
     is_hidden = segment * cable.tangential_drag > cable.virtual_mass_per_length
     if is_hidden and _share(accuracy["force_error"]) <= BARELY * accuracy["rtol"]:
@@ -234,7 +245,7 @@ def is_left_open(run: AnyRun, trial: scenarios.Trial, model: Model) -> bool:
 
 
 def only_just_fits(run: AnyRun) -> bool:
-    """Say whether the error of the tow force was estimated, and so close to `rtol` that it may be larger."""
+    """Return whether the error of the tow force was estimated, and so close to `rtol` that it may be larger."""
     accuracy = json.loads(run.attrs.get("accuracy", "{}"))
     return (
         bool(accuracy)
@@ -249,11 +260,13 @@ def load_across(run: AnyRun, model: Model) -> np.ndarray:
     The current is that at the drum; along the cable it only adds to the pay-out rate.
     """
     time, P, nodes = run["time"].values, run["cable_position"].values, run["node_count"].values
+    # Rows without cable have no last segment; index 1 keeps the indexing valid.
     rows, last = np.arange(time.size), np.maximum(nodes - 1, 1)
     drum, side = P[rows, last], P[rows, last - 1] - P[rows, last]
     along = side / np.maximum(np.linalg.norm(side, axis=1, keepdims=True), np.finfo(float).tiny)
     water = model.water()
     flow = np.array([water.at(place, when) for place, when in zip(drum, time, strict=True)])
+    # The drum may be on a moving vessel: the flow relative to it counts.
     flow = flow - np.gradient(drum, time, axis=0)
     flow -= np.sum(flow * along, axis=1, keepdims=True) * along
     load = model.cable.normal_drag * np.linalg.norm(flow, axis=1, keepdims=True) * flow
@@ -270,14 +283,15 @@ def drum_is_ill_posed(
     cable: CableProperties,
     drum: DrumProperties,
 ) -> np.ndarray:
-    """Say when a free drum does not hold its cable: it unwinds itself, or nothing says in which direction it goes.
+    """Return when a free drum does not hold its cable: it unwinds itself, or the direction of the cable is
+    undetermined.
 
         T(S) ≤ C_f/R_d,  U > 1.2 V                     it unwinds: its weight pulls, not the tow point
         T(S) < m1 U²,    |w_c| > 0.2 ½ρπdC_t U²        it swings: it is faster than its own waves
 
-    In the second case all waves along the cable go away from the drum, so that nothing tells the direction in which it
-    leaves; its weight turns it, unless its drag straightens it within the first m1/(½ρπdC_t) metres. Segments as long
-    as that hide it: then a finer run is worse.
+    In the second case all waves along the cable go away from the drum, so that the direction in which it leaves the
+    drum is not determined; its weight turns it, unless its drag straightens it within the first m1/(½ρπdC_t) metres.
+    Segments as long as that hide it: then a finer run is worse.
 
     Args:
         tension: T(S) at the drum (samples,). [N]
@@ -287,6 +301,7 @@ def drum_is_ill_posed(
         drum: the drum, with its friction.
     """
     held = drum.friction_torque / drum.radius
+    # A tension at the friction of the drum, or below it, cannot turn the drum.
     unwinds = (cable.weight_in_water > 0.0) & (tension <= held * (1.0 + 1e-3) + LIMP)
     unwinds &= payout > OVERRUN * tow_speed
     square = payout * payout
@@ -335,7 +350,7 @@ def _slack(run: AnyRun, trial: scenarios.Trial) -> tuple[np.ndarray, float]:
 
 
 def _how_slack(run: AnyRun, share: np.ndarray, longest: float) -> str:
-    """Say how much of the cable is slack, when, and how long."""
+    """Return how much of the cable is slack, when, and how long."""
     time, worst = run["time"].values, int(share.argmax())
     return (
         f"Up to {percent(share[worst])} of the cable that is paid out is slack (at {time[worst]:g} s; first at "
@@ -351,6 +366,7 @@ def slack_share(run: AnyRun) -> np.ndarray:
 
 def closure(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
     """The cable does not end at the tow point."""
+    # The length at its largest so far: a cable that is reeled in keeps the tolerance of its longest shape.
     gap, S = run["closure_error"].values, np.maximum.accumulate(run["cable_length"].values)
     open_ = gap > CLOSED * np.maximum(S, trial.segment_length)
     if not open_.any():
@@ -379,7 +395,7 @@ def push(run: AnyRun, _: scenarios.Trial, __: Model) -> list[str]:
 
 
 def _finer(trial: scenarios.Trial) -> str:
-    """Say what to do about steps that are too long."""
+    """Return the remedy for steps that are too long."""
     return (
         f"Halve cable_step_s ({trial.cable_step:g} s), hull_step_s ({trial.hull_step:g} s) and segment_length_m "
         f"({trial.segment_length:g} m), and see what changes (--check)."
@@ -387,9 +403,10 @@ def _finer(trial: scenarios.Trial) -> str:
 
 
 def _chords(P: np.ndarray) -> np.ndarray:
-    """Return the distances between neighbouring nodes, 0 behind the last (samples, nodes − 1). [m]."""
+    """Return the distances between neighbouring nodes, 0 after the last (samples, nodes − 1). [m]."""
     x, y, z = np.moveaxis(np.diff(P, axis=1), 2, 0)
     lengths: np.ndarray = np.sqrt(x * x + y * y + z * z)
+    # Rows are padded with NaN after the last node.
     lengths[np.isnan(lengths)] = 0.0
     return lengths
 
@@ -397,6 +414,7 @@ def _chords(P: np.ndarray) -> np.ndarray:
 def _tow_speed(run: AnyRun, time: np.ndarray) -> np.ndarray:
     """Return the speed of the tow point relative to the drum (samples,). [m/s]."""
     P, nodes = run["cable_position"].values, run["node_count"].values
+    # The drum is the last node of each row, and rows differ in their number of nodes.
     drum = P[np.arange(time.size), np.maximum(nodes - 1, 0)]
     speed: np.ndarray = np.linalg.norm(np.gradient(P[:, 0] - drum, time, axis=0), axis=1)
     return speed

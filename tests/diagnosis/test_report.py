@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from subzero.cli.write_diagnosis import tell
+from subzero.cli.write_diagnosis import print_diagnosis
 from subzero.diagnosis import (
     CALIBRATED,
     CAUSE_NAMED,
@@ -304,7 +304,7 @@ def test_a_share_is_told_as_more_or_less_than_in_the_model():
 
 def test_the_terminal_names_the_file_that_is_simulated_with_and_shows_every_error(tmp_path, capsys):
     output_folder = OutputFolder(tmp_path, Path("some where"))
-    tell(NAMED, output_folder, Console(width=80), scenario="fig6")
+    print_diagnosis(NAMED, output_folder, Console(width=80), scenario="fig6")
     said = capsys.readouterr().out
     assert "subzero simulate fig6 --with 'some where/extended.toml'" in said
     assert " ".join(said.split()).count("nominal extended best rival noise floor") == 1

@@ -215,7 +215,7 @@ def test_every_compiled_function_and_what_it_names_is_in_its_key():
         function = made.py_func
         parts = (
             Path(function.__code__.co_filename).relative_to(ROOT).parts
-            if function.__module__.partition(".")[0] in machine_code.PACKAGES
+            if (function.__module__ or "").partition(".")[0] in machine_code.PACKAGES
             else ("",)
         )
         if parts[0] not in machine_code.PACKAGES:
