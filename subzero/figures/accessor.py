@@ -25,7 +25,7 @@ from cable.memory import fits
 from subzero.arguments import check_is_run, checked_arguments
 from subzero.channels import BY_NAME, RENAMED_CHANNELS, TIME
 from subzero.errors import UserError, chosen, printable, short, suggestion
-from subzero.files.integrity import DamagedError, check_arrays, check_digest, decoded_bytes
+from subzero.files.integrity import COPIES, DamagedError, check_arrays, check_digest, claimed_bytes
 from subzero.files.read_file import UnreadableFileError, check_readable
 from subzero.validity import RunWarning, warnings_of
 
@@ -117,8 +117,8 @@ def _check_layout(file: Any, name: str) -> None:
     check_arrays(
         file.variables, channels | {key: row for key, row in LAYOUT.items() if key in file.variables}
     )
-    size = decoded_bytes(file.variables)
-    if not fits(size):
+    size = claimed_bytes(file.variables)
+    if not fits(COPIES * size):
         raise DamagedError(f"it claims {size:.3g} bytes of numbers, more than fit into memory")
 
 

@@ -105,9 +105,9 @@ def check_arrays(
             raise DamagedError(f"{name} has another shape")
 
 
-def decoded_bytes(arrays: Mapping[str, Any]) -> float:
-    """Return how much memory arrays take while they are read and decoded. [bytes]"""
+def claimed_bytes(arrays: Mapping[str, Any]) -> float:
+    """Return how many bytes of numbers arrays claim to have; reading and decoding them takes `COPIES` times as many."""
     sizes = [
         float(np.prod(array.shape, dtype=float)) * np.dtype(array.dtype).itemsize for array in arrays.values()
     ]
-    return COPIES * float(sum(sizes))
+    return float(sum(sizes))

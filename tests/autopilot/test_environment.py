@@ -121,6 +121,7 @@ def test_it_can_be_made_without_its_cable():
     assert info["cable_length"] == 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "program",
     [

@@ -33,6 +33,7 @@ PULSED = cases(
 )  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("part", INPUTS)
 @pytest.mark.parametrize("wet_length,speed", PULSED)
 def test_a_pulse_moves_both_linear_models_like_the_run(part, wet_length, speed):

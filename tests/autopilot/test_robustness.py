@@ -51,6 +51,7 @@ def test_the_delay_margin_is_where_the_loop_becomes_unstable(tuning):
         assert (closed_radius(whole, 1.0) < 1.0) == stable
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("speed", [0.6, 1.0, 1.4])
 def test_every_loop_has_forty_degrees_and_a_factor_of_three(tuning, estimates, speed):
     for name in ("speed", "heading", "pitch", "roll", "lqr"):

@@ -86,6 +86,7 @@ def written(found, tmp_path):
     return tmp_path / "my_vehicle.toml"
 
 
+@pytest.mark.long
 def test_every_number_comes_back_within_its_interval(found, hidden):
     for name, share in hidden.items():
         one = found[name]

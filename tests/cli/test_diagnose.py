@@ -93,6 +93,7 @@ def test_a_diagnosis_tells_the_verdict_then_what_cannot_be_told_apart_and_leaves
     assert engine["records"][0].setting.trial.duration == pytest.approx(10.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("axis", "unit"), [("X", "N"), ("N", "N m"), ("heading", "degree"), ("surge_speed", "m/s")]
 )
@@ -109,6 +110,7 @@ def test_a_screen_is_the_first_look(engine):
     assert engine["budget"] == "screen"
 
 
+@pytest.mark.long
 def test_effects_of_the_users_own_are_given_to_the_engine_and_copied_beside_the_model(engine, tmp_path):
     (tmp_path / "mine.py").write_text(
         "from subzero.diagnosis.hypothesis.effect import Effect\n"

@@ -48,6 +48,7 @@ def test_the_cable_slows_the_vehicle_and_the_energy_balance_closes(fig6):
     assert untethered["energy"]["unexplained_share"] < 1e-3
 
 
+@pytest.mark.long
 def test_a_run_measured_against_itself_fits_by_100_percent(fig6, tmp_path):
     record = ["compare", "fig6", "--measured", str(fig6 / "tethered.csv"), "--out", str(tmp_path)]
     assert main(record) == FINE
@@ -90,6 +91,7 @@ def test_the_python_of_the_readme_runs_in_an_empty_folder(tmp_path, monkeypatch)
     assert {path.name for path in tmp_path.iterdir()} == {"tension.png", "fig6.png"}
 
 
+@pytest.mark.long
 def test_the_python_of_the_tour_runs(tmp_path, monkeypatch):
     """After the command whose file it opens."""
     monkeypatch.chdir(tmp_path)

@@ -43,6 +43,7 @@ def picture(tmp_path, monkeypatch):
     plt.close("all")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in SLOW])
 def test_an_example_leaves_its_picture(name, picture):
     assert picture(name).read_bytes().startswith(PNG)

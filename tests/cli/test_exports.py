@@ -155,6 +155,7 @@ def issues(path, found):
     return [one["msgs"] for kind in kinds for one in said[kind] if one["msgs"]]
 
 
+@pytest.mark.long
 def test_netcdf_for_others_passes_a_checker_of_the_cf_conventions(run, tmp_path):
     assert issues(exported(run, tmp_path, "nc"), tmp_path / "found.json") == []
     subzero.simulate("fig6", tethered=False).to_netcdf(tmp_path / "plain.nc")

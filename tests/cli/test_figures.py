@@ -32,6 +32,7 @@ def line(axes, label):
     return next(one for one in axes.get_lines() if one.get_label() == label)
 
 
+@pytest.mark.long
 def test_figure_6_has_the_four_panels_of_the_paper(comparison):
     assert texts(draw(comparison)["fig6"]) == [
         "(a) Propeller command", "(b) Forward speed", "(c) Rudder, positive to starboard",
@@ -54,6 +55,7 @@ def test_figure_6_shows_where_the_rudder_is_beside_its_command_and_whether_that_
     assert [one.get_label() for one in alike.get_lines()] == ["commanded", "actual, without feedback"]
 
 
+@pytest.mark.long
 def test_tethered_is_solid_untethered_dashed_and_measured_are_dots(comparison):
     run = comparison["tethered"]
     record = Record(source="", time=np.array([0.0, 9.0]), values={"surge_speed": np.array([0.1, 0.9])})
@@ -190,6 +192,7 @@ def test_an_untethered_prescribed_run_has_nothing_to_show(make_run):
     assert draw({"untethered": make_run(tethered=False, prescribed="dive")}) == {}
 
 
+@pytest.mark.long
 def test_a_title_is_plain_text_whatever_it_holds(make_run, tmp_path):
     run = make_run().assign_attrs(title=r"costs $5 and $6_{ [bold] \alpha", scenario="a_$b_{$")
     draw({"tethered": run})["fig6"].savefig(tmp_path / "money.png")
@@ -213,6 +216,7 @@ def test_the_range_graph_has_the_largest_and_smallest_tension_of_every_place(mak
     assert np.ma.getmaskarray(drawn)[0].mean() > 0.9, "there is no cable yet where it is not out"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("width", [3.4, 7.2])
 def test_at_every_width_letters_are_legible_and_no_legend_hides_a_curve(width, comparison, make_run):
     with page_width(width):

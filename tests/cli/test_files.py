@@ -45,6 +45,7 @@ def test_it_says_which_files_it_wrote(compared):
     assert compared.said.endswith(f"Wrote fig6/: {', '.join(sorted(BOTH | PICTURES))}\n")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("flag, kind", [([], "tethered"), (["--untethered"], "untethered")])
 def test_simulate_leaves_one_run(flag, kind, tmp_path, rails):
     assert main(["simulate", "fig6", *flag, "--out", str(tmp_path / "new" / "deep")]) == FINE
@@ -85,6 +86,7 @@ def test_column_names_lead_back_to_their_channels():
         assert BY_COLUMN[column_name(channel.name)] is channel
 
 
+@pytest.mark.long
 def test_two_runs_leave_the_same_bytes(folder, rails, tmp_path):
     assert main(["compare", "fig6", "--out", str(tmp_path / "again")]) == FINE
     for path in folder.iterdir():
@@ -104,6 +106,7 @@ def test_the_summary_has_plain_numbers_with_units_in_their_names(folder):
     }  # fmt: skip
 
 
+@pytest.mark.long
 def test_files_of_the_user_stay_and_old_results_are_replaced(tmp_path, rails):
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / "summary.json").write_text("old")
@@ -137,6 +140,7 @@ def test_a_prescribed_run_gets_figure_4(tmp_path, rails):
     assert json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))["tethered"]["energy"] is None
 
 
+@pytest.mark.long
 def test_commands_of_a_file_replace_those_of_the_scenario(tmp_path, rails):
     path = tmp_path / "commands.csv"
     path.write_text(
@@ -146,6 +150,7 @@ def test_commands_of_a_file_replace_those_of_the_scenario(tmp_path, rails):
     assert rails[0][0].commands.values[0, 0] == 5.0
 
 
+@pytest.mark.long
 def test_a_run_that_stops_keeps_what_it_has_and_exits_with_3(tmp_path, rails, monkeypatch, capsys, make_run):
     def stops(_trial, *, tethered, progress):
         return make_run(outcome="stopped", samples=31) if tethered else make_run(tethered=False)

@@ -195,6 +195,7 @@ def test_the_rule_of_the_last_row_is_said_the_same_everywhere():
 # How a command speaks.
 
 
+@pytest.mark.long
 def test_json_is_one_object_and_it_is_the_summary(here, rails, capsys):
     reported = said(capsys, "compare", "fig6", "--json")
     summary = json.loads(reported.out)

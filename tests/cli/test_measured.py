@@ -149,9 +149,9 @@ def test_a_heading_measured_whole_turns_away_is_the_same_heading(offset, make_ru
     record = Record(
         source="", time=run["time"].values, values={"heading": run["heading"].values - 720.0 + offset}
     )
-    assert fit(run, with_heading_of(record, modelled(run, "heading", record.time)), "heading").bias == pytest.approx(
-        -offset, abs=1e-9
-    )
+    assert fit(
+        run, with_heading_of(record, modelled(run, "heading", record.time)), "heading"
+    ).bias == pytest.approx(-offset, abs=1e-9)
 
 
 def test_compare_prints_and_stores_the_error_of_each_model(file, rails, capsys, compared):

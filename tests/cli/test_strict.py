@@ -44,6 +44,7 @@ def test_dataset_json_and_terminal_tell_the_same_warnings(doubtful, tmp_path, ca
         assert json.loads(run.attrs["warnings"]) == DOUBTS
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("words", [["compare", "fig6"], ["simulate", "fig6"]])
 def test_strict_writes_everything_and_exits_with_3(words, doubtful, tmp_path, capsys):
     assert main([*words, "--strict", "--out", str(tmp_path)]) == STOPPED

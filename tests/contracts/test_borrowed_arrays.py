@@ -7,6 +7,8 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 BORROWING = {"compiled", "inner", "inlined"}
 
@@ -40,6 +42,7 @@ def faults(text: str, giving: set[str]) -> list[str]:
     ]
 
 
+@pytest.mark.long
 def test_only_allocating_functions_give_arrays_or_are_given_some():
     paths = [path for part in ("cable", "vehicle", "subzero") for path in (ROOT / part).rglob("*.py")]
     texts = {str(path): path.read_text() for path in paths}

@@ -76,6 +76,7 @@ def test_the_engine_of_a_diagnosis_is_as_small_as_is_asked_for():
     assert [goal.line() for goal in engine_goals(product()) if not goal.is_met] == []
 
 
+@pytest.mark.long
 def test_a_target_that_is_missed_says_so(stands):
     asked = goals(stands)
     for goal, line in zip(asked, targets(asked).splitlines()[1:], strict=True):

@@ -99,6 +99,7 @@ def test_the_cable_feels_the_tow_points_path_and_nothing_else(name, simulate):
     assert_allclose(alone.length, run["cable_length"].values, rtol=0, atol=1e-5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["fig6", "wide_turn", "dive"])
 def test_the_hull_feels_the_cables_force_and_moment_and_nothing_else(name, simulate, trial_of, hull_alone):
     """SciPy's hull under the recorded wrench takes the recorded course: 1e-4 m/s, 0.05°."""

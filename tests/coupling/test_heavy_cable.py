@@ -52,6 +52,7 @@ def assert_surges_alike(run, speed, length, tolerance):
     assert float(run["cable_node_tension"].min()) >= 0.0
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("wet_length", [0.0, 30.0])
 @pytest.mark.parametrize(
     "drum",

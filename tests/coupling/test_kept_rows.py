@@ -80,6 +80,7 @@ def test_what_is_no_whole_number_of_cable_steps_is_refused(every):
         subzero.simulate("fig6", every=every)
 
 
+@pytest.mark.long
 def test_the_file_and_the_command_say_it(tmp_path, monkeypatch, capsys):
     text = scenarios.path("fig6").read_text(encoding="utf-8").replace("duration_s = 30.0", "duration_s = 3.0")
     (tmp_path / "mine.toml").write_text(text.replace("every_s = 0.0", "every_s = 0.5"), encoding="utf-8")
@@ -111,6 +112,7 @@ def test_a_long_run_keeps_fewer_results_unasked_says_so_and_keeps_all_when_told_
     assert "thinned" not in plain.attrs
 
 
+@pytest.mark.long
 def test_both_runs_of_a_comparison_keep_as_many_and_a_record_is_set_beside_all(
     little_kept, tmp_path, monkeypatch, capsys
 ):

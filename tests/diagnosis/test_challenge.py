@@ -166,6 +166,7 @@ def test_an_effect_that_begins_at_t_changes_nothing_before():
     assert np.abs(struck - plain)[150:].min() > 0.5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_what_is_outside_the_catalogue_shows_on_its_axis(kind):
     assert kind not in EFFECTS

@@ -65,6 +65,7 @@ def found(plant):
     return hit(plant, 3.0)
 
 
+@pytest.mark.long
 def test_what_began_is_found_with_its_size_and_its_time(found):
     _, force, (one, *others) = found
     assert one.change_point.effect.id == "rudder_offset"
@@ -167,6 +168,7 @@ def test_what_nearly_stops_is_found_by_simulations_as_large_as_it_is(hanging):
     assert one.log_posterior > throughout.log_posterior + 10.0
 
 
+@pytest.mark.long
 def test_it_is_reported_with_its_onset_and_its_size(plant):
     """A record in, a verdict out, at the public face."""
     planted = plant(lambda setting: with_onset(EFFECTS["rudder_offset"], BEGINS).apply(setting, 3.0))

@@ -46,11 +46,13 @@ def test_both_ways_agree_where_the_model_hardly_bends(plant):
     assert here == pytest.approx(there, abs=1.0), "a nat: what is not linear in so small a force"
 
 
+@pytest.mark.long
 def test_weed_is_far_more_probable_where_the_model_is_not_bent_to_do_without_it(plant):
     here, there = both_ways(plant(weed(-0.08)))
     assert here > there + 5.0
 
 
+@pytest.mark.long
 def test_a_compass_that_wanders_is_more_probable_than_any_force_that_turns_the_vehicle(plant):
     planted = plant(
         drift={"heading": lambda time: 4.0 * np.sin(np.pi * np.clip((time - 5.0) / 15.0, 0.0, 1.0)) ** 2}

@@ -139,6 +139,7 @@ def named(verdict) -> set[str]:
     return {one.id for one in verdict.data_errors} if verdict.verdict == "data_error" else set()
 
 
+@pytest.mark.long
 def test_two_errors_at_once_are_named_at_the_public_face_and_nothing_is_converted():
     clean = measured("fig6", 20251)
     errors = EACH[0], EACH[2]
@@ -170,6 +171,7 @@ def frozen(logged: Logged, channel: str, since: float) -> Logged:
     return DataError(kind="frozen", channels=(channel,), since=since, at=at).planted(logged)
 
 
+@pytest.mark.long
 def test_a_rounded_channel_that_froze_is_named_at_the_public_face():
     """The heading of a zigzag in steps of 1 degree, beside the two channels that say that it goes on."""
     whole = measured("zigzag", 20262).record
@@ -216,6 +218,7 @@ def test_an_error_that_physics_has_no_chance_against_is_corrected_before_anythin
     assert words.count("sensitivities of the nominal model") == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("channel", "other"), [("depth", 20301), ("surge_speed", 20302)])
 def test_a_channel_whose_noise_has_tails_is_in_no_other_unit(channel, other):
     """A tenth of the samples five levels off: in a smaller unit they would be no outliers, and a sensor that shows too
@@ -286,6 +289,7 @@ def check_number(error: DataError, family: str, seed: int) -> None:
     assert "±" in sentence
 
 
+@pytest.mark.long
 def test_the_number_of_an_error_is_told_with_its_interval_under_slow_noise():
     """In the linear problem alone a rate of 0.12 was found several standard deviations off."""
     check_number(NUMBERED[2], "slower", 20301)

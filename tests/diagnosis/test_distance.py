@@ -4,11 +4,14 @@ Verifies: more drag and less thrust on a straight course look alike from then on
 nothing else. Configuration: a healthy record of fig6, of the world benchmark.
 """
 
+import pytest
+
 from benchmarks.diagnosis.distance import sensitivities, sudden_distance
 from benchmarks.diagnosis.world import Drawn, record_of
 from subzero.diagnosis.inference import pose
 
 
+@pytest.mark.long
 def test_thrust_and_drag_from_then_on_look_alike_and_a_rudder_like_nothing_else():
     logged, _ = record_of(Drawn(seed=7, index=0, flown="fig6", family="mild", cause=""))
     problem = pose([logged])

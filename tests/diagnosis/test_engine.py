@@ -108,6 +108,7 @@ def test_a_bounded_step_is_the_best_within_bounds(seed):
     assert_allclose(step, best, atol=1e-8)
 
 
+@pytest.mark.long
 def test_a_response_shows_what_a_run_records():
     """In the run's own steps: to the tolerance within which hull and cable agree, and the rub of its drum, 1 mN."""
     run = subzero.simulate("fig6")

@@ -62,6 +62,7 @@ def reported(estimated, force, axis="X", sd=0.02):
     return describe(dataclasses.replace(estimated, data=data, unknown=unknown))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("feature", ["u|u|", "wet_length", "time*u2", "n u"])
 def test_the_feature_is_found_with_its_coefficient(estimated, features, feature):
     c = -0.5 / np.abs(features[feature]).max()

@@ -26,6 +26,7 @@ def struck(plant):
     return planted, fits
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_the_right_cause_is_sure_to_gain_and_a_wrong_one_is_not(plant, seed):
     """It is the lower bound that tells them apart: the fit of a wrong cause is strained, and its gain scatters widely

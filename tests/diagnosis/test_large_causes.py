@@ -111,6 +111,7 @@ def test_what_an_early_clock_logs_last_happened_after_the_last_sample(duration):
 
 @pytest.mark.parametrize(("scenario", "late"), [("zigzag", -0.9), pytest.param("zigzag", 1.2, marks=pytest.mark.slow),
                                                 pytest.param("dive", 1.3, marks=pytest.mark.slow)])  # fmt: skip
+@pytest.mark.long
 def test_a_clock_that_is_late_by_less_than_an_error_makes_no_error_of_data(scenario, late):
     """It had been told as a clock 1.5 s late, the least that is an error, with certainty; without that as another rate
     of the clock, or as two delays: what a clock does within that is not linear, either.

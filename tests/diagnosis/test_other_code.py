@@ -59,6 +59,7 @@ def shown(setting, run):
     return seen(setting, Truth, TIMES, CHANNELS)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", CASES)
 def test_both_formulations_agree_far_within_the_noise(name):
     setting, share = CASES[name]

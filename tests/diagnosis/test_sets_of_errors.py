@@ -206,6 +206,7 @@ def test_an_interrupt_of_that_search_keeps_what_was_found(monkeypatch):
     assert not all(one.work.complete for one, _ in tried)
 
 
+@pytest.mark.long
 def test_what_would_make_a_quiet_channel_loud_is_not_suspected():
     """A rounded heading hardly leaves a value: radians explain its steps, worth 74 nats, and nothing else of it. The
     right verdict took 100 s.

@@ -36,6 +36,7 @@ def turning(**causes: float) -> Logged:
     return Logged(record=make_record(true, TIME, CHANNELS, seed=11), setting=setting, name="turn")
 
 
+@pytest.mark.long
 def test_an_outlier_among_the_samples_that_a_clock_loses_is_worth_no_more_than_any_outlier():
     """A clock that is 2 s early loses the last ten samples. Three outliers among them had been worth 12 nats each: a
     lost sample counted as the mean of its channel, and these had cost more than it.
@@ -50,6 +51,7 @@ def test_an_outlier_among_the_samples_that_a_clock_loses_is_worth_no_more_than_a
     assert leads[1] == pytest.approx(leads[0], abs=3.0)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("cause", "amount", "ahead"), [("roll_stiffness", -0.5, 18.0), ("rudder_lift_slope", -0.5, 12.0)]
 )
@@ -62,6 +64,7 @@ def test_one_large_cause_explains_more_where_it_is_than_several_at_the_nominal_m
     assert most_of_one_cause(problem, 0) > most_of_physics(problem, 0) + ahead
 
 
+@pytest.mark.long
 def test_nothing_is_explained_by_a_cause_that_is_not_there():
     """The price of a cause is that of one of forty; its number costs more evidence than it gains."""
     assert most_of_one_cause(pose([turning()]), 0) < 3.0

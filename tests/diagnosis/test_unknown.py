@@ -154,6 +154,7 @@ def reported(change, seed, drift=None):
     return subzero.diagnose(subzero.Logged(record=record, setting=setting, name="fig6"), budget="verdict")
 
 
+@pytest.mark.long
 def test_a_compass_that_wanders_by_many_levels_drifts_though_slow_noise_could_say_so_too():
     """Behind nothing the wander is noise, and beside that noise there is little left of it: each has an optimum of its
     own, and a drift was only looked for beside the noise behind nothing.
@@ -180,6 +181,7 @@ def test_every_explanation_that_an_undecided_verdict_names_has_its_curve():
     }
 
 
+@pytest.mark.long
 def test_a_moment_that_heels_the_hull_for_some_seconds_is_no_noise_of_the_roll_angle():
     heel = pushed("K", lambda time: 0.02 * one_bump(time, 2.0, 16.0))
     found = reported(heel, 17)
@@ -187,6 +189,7 @@ def test_a_moment_that_heels_the_hull_for_some_seconds_is_no_noise_of_the_roll_a
     assert next(iter(found.probabilities)) in ("unknown_force:K", "sensor_drift:roll_angle")
 
 
+@pytest.mark.long
 def test_a_compass_whose_noise_is_slow_does_not_drift():
     """Noise of a usual level that lasts for 3 s, in one channel of six."""
     random = np.random.default_rng(13)
@@ -253,5 +256,6 @@ def test_no_force_is_named_in_an_unstable_motion_that_no_run_follows(tmp_path):
     assert "is unstable, and no simulation follows it for long" in str(summary(verdict))
 
 
+@pytest.mark.long
 def test_a_motion_that_is_stable_is_not_called_unstable():
     assert not reported(lambda setting: setting, 19).unstable

@@ -102,6 +102,7 @@ def check(case: Case, judged: Judged) -> None:
     assert sum(verdict.probabilities.values()) < 1.0 + 1e-9
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", QUICK, ids=lambda case: f"{case.scenario}-{case.seed}")
 def test_a_verdict_is_true_or_not_sure(case, judged):
     check(case, judged(case))

@@ -92,6 +92,7 @@ def coded_matrices(y, c: Equation7Numbers):
     return M, N, q
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stretch_momentum", [0.0, 1.0])
 def test_every_entry_of_equation_7_follows_from_the_vector_equations(stretch_momentum):
     c = equation7_numbers(HEAVY, CURRENT, stretch_momentum=stretch_momentum)

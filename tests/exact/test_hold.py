@@ -141,6 +141,7 @@ def collocated(cord, length, current, ends):
     return solved.y[:3, 0]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("mass", "compliance", "current", "ends"),
     [
@@ -193,6 +194,7 @@ def test_a_mirrored_problem_has_the_mirrored_answer():
     assert_allclose(turned.shape[::-1], held.shape, atol=1e-6)
 
 
+@pytest.mark.long
 def test_bending_stiffness_flattens_the_bottom_of_a_loop():
     """A cable that bends over (EI/w_c)^⅓ = 0.4 m turns more gently than a limp one, and is as heavy."""
     limp, stiff = (

@@ -76,6 +76,7 @@ def test_a_stretched_straight_tow_starts_at_its_closed_form(drogue):
     assert stretched == pytest.approx(LENGTH * (1.0 + e * mean), rel=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("speed", [0.0, 1.0])
 def test_a_stiff_cable_starts_as_quietly(speed):
     """A straight cable does not bend."""

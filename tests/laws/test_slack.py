@@ -52,6 +52,7 @@ def pull(name, drum, duration=16.0, **kwargs):
     return run
 
 
+@pytest.mark.long
 @every_manoeuvre
 @every_drum
 def test_tension_is_never_negative_and_nothing_is_lost(name, drum):

@@ -57,6 +57,7 @@ def assert_follows(matrix, motion, **kwargs):
     np.testing.assert_allclose(other.shape(8.0), plain.shape(8.0) @ matrix.T, rtol=0, atol=TOLERANCE)
 
 
+@pytest.mark.long
 @given(course=angles, climb=angles, amplitude=amplitudes, turn=angles)
 @settings(max_examples=25, deadline=None, derandomize=True)
 def test_turning_the_heading_turns_the_force(course, climb, amplitude, turn):

@@ -108,6 +108,7 @@ ONCE_WRONG = {
 ill-posed in a current that turns, and eight times as many segments move its force by 8 %, four times as many do not."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ONCE_SILENT)
 def test_what_was_wrong_without_a_word_warns(name):
     run = subzero.simulate(ONCE_SILENT[name])

@@ -104,6 +104,7 @@ AT_THE_PAPERS_RATE = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction", [0.0, 0.005], ids=["free drum", "rubbing drum"])
 @pytest.mark.parametrize(
     ("name", "in_tension", "in_force"),

@@ -157,28 +157,3 @@ def test_what_cannot_be_allowed_is_refused(name, value):
 def test_a_scheme_has_only_the_options_that_it_knows(kind, name):
     with pytest.raises(TypeError, match=name):
         kind(**{name: 0.1})
-
-
-MOVED = {
-    "step": (0.05, r"scheme=cable.MovingEnd\(time_step=0.05\)"),
-    "segment_length": (0.25, r"scheme=cable.MovingEnd\(segment_length=0.25\)"),
-    "rtol": (1e-3, r"scheme=cable.MovingEnd\(rtol=0.001\)"),
-    "wet_length": (2.0, "start=2.0"),
-    "drum_velocity": (dive, r"drum=cable.MovingDrum\(velocity=..., drum=...\)"),
-}
-
-
-@pytest.mark.parametrize("name", MOVED)
-def test_an_argument_of_older_versions_says_where_it_is_now(name):
-    value, place = MOVED[name]
-    with pytest.raises(ValueError, match=rf"pull_out: {name} moved. Write {place}"):
-        cable.pull_out(dive, 1.0, **{name: value})
-
-
-def test_what_was_given_by_its_place_says_so_too_and_what_never_was_is_no_argument():
-    with pytest.raises(
-        ValueError, match=r"tow: step, rtol moved. Write scheme=cable.MovingEnd\(time_step=0.1, rtol=0.01\)"
-    ):
-        cable.tow(dive, 10.0, 1.0, 0.1, rtol=0.01)
-    with pytest.raises(TypeError, match="unexpected keyword argument 'colour'"):
-        cable.pull_out(dive, 1.0, colour="red")

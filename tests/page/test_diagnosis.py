@@ -224,6 +224,7 @@ def test_what_acts_is_said_as_what_it_does(verdict: Verdict, logged: Logged) -> 
     assert "acts on K" not in read.text
 
 
+@pytest.mark.long
 @pytest.mark.skipif(browser.installed() is None, reason="needs Debian's chromium and chromium-driver")
 def test_in_a_browser_the_ghosts_are_where_their_runs_and_the_record_say(
     verdict: Verdict, logged: Logged, tmp_path: Path

@@ -143,6 +143,7 @@ def saved(one: Exploration, values: dict[str, float], path: Path) -> Any:
     return subzero.load_scenario(path)
 
 
+@pytest.mark.long
 @needs_extra
 @pytest.mark.parametrize("name", ["fig6", "zigzag", "rov_umbilical", "current"])
 def test_a_saved_file_is_the_same_trial_to_the_last_bit_whatever_was_moved(name: str, tmp_path: Path) -> None:
@@ -307,6 +308,7 @@ def served(folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
             process.kill()
 
 
+@pytest.mark.long
 @needs_extra
 def test_only_this_machine_is_served_and_ctrl_c_ends_it(tmp_path: Path) -> None:
     with served(tmp_path) as (process, url):
@@ -341,6 +343,7 @@ def shown(driver: Any, words: str) -> list[str]:
     return next(cells for name, *cells in rows if name == words)
 
 
+@pytest.mark.long
 @needs_extra
 @needs_browser
 def test_a_slider_moves_the_numbers_and_the_replay_to_those_of_simulate(tmp_path: Path) -> None:

@@ -125,6 +125,7 @@ def opened(server: Server, **headers: str) -> Iterator[Page]:
 # Who is let in.
 
 
+@pytest.mark.long
 @needs_extra
 @pytest.mark.parametrize(
     "path", ["/", "/?token=", "/?token=wrong", "/replay", "/runs/x", "/docs", "/openapi.json"]
@@ -202,6 +203,7 @@ def test_what_a_browser_is_started_with_does_not_hold_the_token(monkeypatch: pyt
 # What is sent.
 
 
+@pytest.mark.long
 @needs_extra
 def test_odd_positions_of_sliders_are_ignored_and_the_next_good_one_counts(tmp_path: Path) -> None:
     with served(tmp_path) as (process, url):
@@ -237,6 +239,7 @@ def test_a_file_is_named_by_printable_characters_without_a_path(server: Server, 
 # How much there is of it.
 
 
+@pytest.mark.long
 @needs_extra
 def test_pages_that_nobody_looks_at_are_forgotten(server: Server) -> None:
     from subzero.explore.page import MOST_TABS
@@ -253,6 +256,7 @@ def test_pages_that_nobody_looks_at_are_forgotten(server: Server) -> None:
         page.wait_for("Changed; the run took")
 
 
+@pytest.mark.long
 @needs_extra
 def test_memory_does_not_grow_with_moves(server: Server) -> None:
     with opened(server) as page:
@@ -302,6 +306,7 @@ def test_a_long_run_is_answered_by_its_first_seconds(short: Exploration) -> None
     assert not last.rough
 
 
+@pytest.mark.long
 @needs_extra
 @needs_browser
 def test_the_page_opens_with_the_token_alone_and_hides_it(server: Server) -> None:

@@ -217,6 +217,7 @@ json.dump([run.attrs["scheme"], sorted(sys.modules)], sys.stdout)
 """
 
 
+@pytest.mark.long
 def test_a_default_run_imports_nothing_of_the_papers_scheme():
     done = subprocess.run([sys.executable, "-c", LOOK], capture_output=True, check=True)
     scheme, modules = json.loads(done.stdout)

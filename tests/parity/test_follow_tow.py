@@ -116,6 +116,7 @@ def test_without_factors_nothing_moves_and_the_step_begins_with_a_prediction(tow
     assert asked(line, work, tow, again=True).iterations > 0
 
 
+@pytest.mark.long
 def test_a_stiff_cable_has_a_matrix_but_no_factors_and_begins_with_a_prediction():
     line, work, tow = pulled(STIFF)
     assert not follow(line, tow + ASIDE)

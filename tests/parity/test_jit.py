@@ -12,6 +12,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 
 SCRIPT = """
@@ -52,6 +53,7 @@ def reported(**environment):
     return {name: np.array(values) for name, values in json.loads(answer.stdout).items()}
 
 
+@pytest.mark.long
 def test_compiled_and_interpreted_code_give_the_same_numbers():
     compiled, interpreted = reported(NUMBA_DISABLE_JIT="0"), reported(NUMBA_DISABLE_JIT="1")
     assert len(compiled["shape"]) > 3  # nodes have come in

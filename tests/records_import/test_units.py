@@ -7,6 +7,7 @@ noise, and one to five columns that were renamed and not converted, at random. T
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 
 import subzero
@@ -54,6 +55,7 @@ def channel_of(column):
     return {channel.column: channel.name for channel in subzero.CHANNELS}[column]
 
 
+@pytest.mark.long
 def test_of_200_logs_with_wrong_units_none_is_imported_wrongly_without_a_word(tmp_path):
     asked = 0
     for seed in range(200):

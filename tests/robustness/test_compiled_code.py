@@ -239,6 +239,7 @@ print(state.tolist())
 """
 
 
+@pytest.mark.long
 def test_an_index_that_has_moved_in_another_file_is_seen(tmp_path):
     """`vehicle/state.py` compiles nothing itself; the code that it is part of stands in `vehicle/actuators.py`."""
     for package in machine_code.PACKAGES:
@@ -268,6 +269,7 @@ def test_an_index_that_has_moved_in_another_file_is_seen(tmp_path):
     assert settled() == settled(NUMBA_DISABLE_JIT="1") != before
 
 
+@pytest.mark.long
 def test_import_changes_nothing_in_the_process():
     code = """
 import gc, os, signal, sys, threading

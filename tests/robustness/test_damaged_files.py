@@ -200,7 +200,7 @@ def test_arrays_of_another_shape_or_kind_never_reach_compiled_code(kept, change,
         subzero.simulate(FIG6, checkpoint=checkpoint)
 
 
-@pytest.mark.parametrize("name", ["files", "behind", "room", "used"])
+@pytest.mark.parametrize("name", ["behind", "room", "used"])
 @pytest.mark.parametrize("value", [10**12, -1, 2.5, [1, 2], "x"])
 def test_counts_that_cannot_be_are_refused(kept, name, value):
     checkpoint, path = kept
@@ -211,13 +211,12 @@ def test_counts_that_cannot_be_are_refused(kept, name, value):
 
 def test_a_flipped_bit_in_a_number_of_a_checkpoint_is_found(kept):
     checkpoint, path = kept
-    for file in (path, path.with_name("rows-000000.npz")):
-        good = file.read_bytes()
-        for at in (60, len(good) // 2, len(good) - 5):
-            file.write_bytes(good[:at] + bytes([good[at] ^ 4]) + good[at + 1 :])
-            with pytest.raises(subzero.UserError, match=r"^The checkpoint .* is damaged"):
-                subzero.simulate(FIG6, checkpoint=checkpoint)
-        file.write_bytes(good)
+    good = path.read_bytes()
+    for at in (60, len(good) // 2, len(good) - 5):
+        path.write_bytes(good[:at] + bytes([good[at] ^ 4]) + good[at + 1 :])
+        with pytest.raises(subzero.UserError, match=r"^The checkpoint .* is damaged"):
+            subzero.simulate(FIG6, checkpoint=checkpoint)
+    path.write_bytes(good)
 
 
 # Stores of sweeps.

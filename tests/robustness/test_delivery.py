@@ -157,6 +157,7 @@ def broken(place):
     return run
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how", ["interrupt", "full", "kill"])
 @pytest.mark.parametrize("kind", ["new", "old"])
 def test_broken_off_at_any_line_a_folder_is_all_old_or_all_new_or_says_so(broken, how, kind):

@@ -478,6 +478,7 @@ ENDINGS = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("number", "streams", "how"), ENDINGS)
 def test_a_command_ends_whatever_became_of_its_streams(number, streams, how):
     """Where the reader of stderr had gone, the thread that ends a command died of it with a lock in its hands: the
@@ -512,6 +513,7 @@ UNREAD = {
 }  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("streams", UNREAD)
 @pytest.mark.parametrize("words", ["list", "show fig6", "list --json", "simulate none"])
 def test_output_that_nothing_reads_is_no_traceback_and_no_silent_failure(streams, words):

@@ -64,6 +64,7 @@ def started(code, folder):
     )
 
 
+@pytest.mark.long
 def test_every_module_is_imported(tmp_path):
     done = started(IMPORTS, tmp_path)
     assert done.returncode == 0, done.stderr
@@ -79,6 +80,7 @@ design = "grid"
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "file"),
     [

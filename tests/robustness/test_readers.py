@@ -41,6 +41,7 @@ def spoil(name, seed, count, folder):
     return counts
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", READERS)
 def test_a_spoiled_file_is_read_or_refused(name, tmp_path):
     assert readers.outcome(READERS[name], READERS[name].good, tmp_path) == "read"

@@ -65,6 +65,7 @@ def drawn(seed, count, folder):
     return counts
 
 
+@pytest.mark.long
 def test_whatever_value_is_made_works_or_is_refused(tmp_path):
     drawn(0, SHORT, tmp_path)
 

@@ -350,6 +350,7 @@ def test_effects_of_a_linear_outcome_are_those_of_algebra():
     assert sizes["sobol"][0] > sizes["sobol"][1] > 0.0
 
 
+@pytest.mark.long
 def test_a_pool_goes_on_after_a_process_that_is_killed():
     pool = WorkerPool(2)
     try:
@@ -362,6 +363,7 @@ def test_a_pool_goes_on_after_a_process_that_is_killed():
         pool.shutdown(cancel_futures=True)
 
 
+@pytest.mark.long
 def test_processes_that_never_begin_are_an_error(monkeypatch):
     monkeypatch.setattr("subzero.sweeps.workers._begin", _end_yourself)
     pool = WorkerPool(1)
@@ -432,6 +434,7 @@ channels = ["heading"]
 """
 
 
+@pytest.mark.long
 def test_the_command_writes_everything_and_goes_on_where_it_was(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "mine.toml").write_text(SPEC, encoding="utf-8")

@@ -19,6 +19,7 @@ def assert_passed(case, quick):
     assert not failed, "\n".join(failed)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", [case for case in CASES if not case.slow], ids=lambda case: case.name)
 def test_gates_are_met_at_coarse_refinements(case):
     assert_passed(case, quick=True)

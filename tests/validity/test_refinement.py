@@ -105,6 +105,7 @@ def mine(tmp_path):
     return tmp_path
 
 
+@pytest.mark.long
 def test_check_on_the_command_line_tells_table_and_warning_everywhere_and_strict_exits_with_3(mine, capsys):
     words = ["compare", str(mine / "coarse.toml"), "--check", "--strict", "--out", str(mine / "out")]
     assert main(words) == STOPPED
@@ -121,6 +122,7 @@ def test_check_on_the_command_line_tells_table_and_warning_everywhere_and_strict
         assert [one._asdict() for one in subzero.warnings_of(run)] == summary["warnings"]
 
 
+@pytest.mark.long
 def test_a_run_that_is_fine_enough_passes_strict(mine):
     words = ["simulate", str(mine / "fine.toml"), "--untethered", "--check", "--strict"]
     assert main([*words, "--out", str(mine / "fine")]) == FINE

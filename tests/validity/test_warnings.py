@@ -98,6 +98,7 @@ def test_a_residual_is_held_against_the_largest_energy_of_the_run_as_a_force_is(
     assert "leaves up to 1.2 % of the largest term unexplained" in said
 
 
+@pytest.mark.long
 def test_a_taut_cable_on_a_brake_leaves_energy_unexplained():
     """Twenty kilograms of cable are stopped by a brake in one step of 0.2 s."""
     trial = trial_of(
@@ -408,6 +409,7 @@ def test_a_cable_that_is_pulled_is_not_slack():
     assert not checked(plain(), check="slack")
 
 
+@pytest.mark.long
 def test_the_papers_cable_pushes_and_does_not_close_and_says_so():
     """A vehicle that is driven backwards pushes the printed cable, until the run stops; ours goes slack."""
     commands = scenarios.Commands(
@@ -606,6 +608,7 @@ def test_a_run_of_an_older_version_carries_none():
     assert subzero.warnings_of(run) == ()
 
 
+@pytest.mark.long
 def test_a_stepped_run_ends_with_the_same_warnings():
     sim = subzero.Simulator(trial_of(duration=3.0), tethered=False)
     while sim.time < 3.0 - 1e-6:
