@@ -81,6 +81,7 @@ def test_a_compass_that_is_shifted_for_good_and_one_of_five_degrees_are_believed
     assert not contradicted(5.0 * np.round(as_shown(TURNING) / 5.0)).any()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("begin", "goal", "way"), [(10.0, 350.0, -20.0), (350.0, 10.0, 20.0), (359.9, 0.0, 0.1)]
 )

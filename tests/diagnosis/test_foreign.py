@@ -27,6 +27,7 @@ PEER_COLUMNS = {
 }
 
 
+@pytest.mark.long
 def test_a_channel_that_breaks_a_diagnosis_is_set_aside_and_named(monkeypatch):
     run, rng = subzero.simulate("fig6"), np.random.default_rng(0)
     time = run["time"].values

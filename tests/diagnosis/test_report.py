@@ -341,6 +341,7 @@ def test_the_table_of_what_can_be_seen_shows_what_would_be_missed_or_mixed_up_wo
     assert len(report.tables.detectable(NAMED, every=True).rows) == 3
 
 
+@pytest.mark.long
 def test_what_can_be_seen_has_its_unit(plant):
     planted = plant(duration=12.0)
     found = detectability(planted.problem, planted.J)
