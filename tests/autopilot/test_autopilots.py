@@ -63,6 +63,7 @@ def rms(values):
     return float(np.sqrt(np.mean(values**2)))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("feed_forward", ["formula", "model"])
 def test_feed_forward_makes_the_speed_error_five_times_smaller(fig6, tuning, feed_forward):
     fed = {

@@ -295,6 +295,7 @@ def test_a_file_without_an_autopilot_is_told(fig6, tuning, tmp_path, text, words
         autopilot.make(path, fig6, tuning=tuning)
 
 
+@pytest.mark.long
 def test_the_command_line_flies_a_file_and_tells_of_its_nonsense(tmp_path, capsys, monkeypatch):
     """A file that answers NaN: exit code of a stopped run, the files of what there is, the reason."""
     monkeypatch.chdir(tmp_path)

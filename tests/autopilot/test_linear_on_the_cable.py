@@ -59,6 +59,7 @@ def test_a_pulse_moves_both_linear_models_like_the_run(part, wet_length, speed):
         ],
     ),
 )  # fmt: skip
+@pytest.mark.long
 def test_a_sine_moves_the_linear_model_like_the_run(part, speed, wet_length, frequency):
     assert 2.0 * np.pi * speed / frequency < 0.4 * wet_length
     expected = disturbed.answer(speed, wet_length, part, frequency)
@@ -81,6 +82,7 @@ def test_with_its_drag_made_linear_the_model_turns_by_degrees_like_the_run():
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "name,times",
     cases(

@@ -161,6 +161,7 @@ def test_the_spiral_of_the_bare_hull_is_that_of_its_linear_model(mirrored):
     assert found["loop_height_deg_s"] == pytest.approx(0.0, abs=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", autopilot.STEPS)
 def test_a_step_settles_without_a_cable_and_with_one_that_is_fed_forward(name, tuning):
     for tethered, feed_forward in ((False, "none"), (True, "formula")):

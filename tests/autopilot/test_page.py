@@ -68,6 +68,7 @@ def test_flown_margins_of_the_page_are_those_of_the_linear_model_to_a_tenth():
         assert flown == pytest.approx(linear, rel=0.1)
 
 
+@pytest.mark.long
 def test_sections_of_the_page_are_told_apart_and_refused():
     found = parts_of(PAGE.read_text())
     assert list(found) == list(SECTIONS)

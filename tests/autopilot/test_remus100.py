@@ -93,6 +93,7 @@ def test_every_manoeuvre_flies_at_a_speed_that_it_holds(fig6, name):
     assert np.isfinite(list(measured.values())).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pilot", ["pid", "lqr"])
 def test_an_autopilot_is_designed_at_speeds_that_it_holds_and_keeps_the_depth(fig6, pilot):
     run, measured = autopilot.step(
@@ -112,6 +113,7 @@ def test_a_dive_that_planes_held_still_do_not_ask_for_is_warned_of(fig6):
     assert said.endswith("Let an autopilot steer it (subzero autopilot).")
 
 
+@pytest.mark.long
 def test_nothing_unnamed_is_left_between_ours_and_the_other_simulator():
     judged = [row for row in remus.rows(quick=True) if row.judged]
     assert len(judged) == 8

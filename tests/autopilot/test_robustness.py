@@ -30,6 +30,7 @@ def closed_radius(loop, factor):
     return np.max(np.abs(np.linalg.eigvals(closed)[np.abs(np.linalg.eigvals(closed) - 1.0) > 1e-9]))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["speed", "heading", "pitch", "roll", "lqr"])
 @pytest.mark.parametrize("wet_length", [0.0, 20.0])
 def test_the_gain_margin_is_where_the_loop_becomes_unstable(tuning, estimates, name, wet_length):

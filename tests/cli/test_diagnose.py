@@ -74,6 +74,7 @@ def engine(monkeypatch, tmp_path):
     return asked
 
 
+@pytest.mark.long
 def test_a_diagnosis_tells_the_verdict_then_what_cannot_be_told_apart_and_leaves_all_its_files(
     engine, tmp_path, capsys
 ):
@@ -125,6 +126,7 @@ def test_effects_of_the_users_own_are_given_to_the_engine_and_copied_beside_the_
     assert 'effects_file = "mine.py"' in (tmp_path / "found/extended.toml").read_text()
 
 
+@pytest.mark.long
 def test_ctrl_c_keeps_what_there_is(engine, tmp_path, capsys):
     engine["answer"] = replace(NAMED, complete=False)
     assert main(["diagnose", "record.csv", "--scenario", "fig6", "--out", "found"]) == INTERRUPTED
@@ -229,6 +231,7 @@ def test_a_full_disk_stops_a_diagnosis_with_one_message_and_no_files(most, engin
     assert not (tmp_path / "found").exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("most", [10, 1_000])
 def test_a_full_disk_stops_a_challenge_with_one_message_and_no_files(most, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -27,6 +27,7 @@ def fig6(tmp_path_factory):
     return folder
 
 
+@pytest.mark.long
 def test_a_real_run_has_every_channel_with_its_unit_and_says_where_it_came_from(fig6):
     for name in ("tethered", "untethered"):
         with xr.open_dataset(fig6 / f"{name}.nc") as run:
@@ -58,6 +59,7 @@ def test_a_run_measured_against_itself_fits_by_100_percent(fig6, tmp_path):
     assert channels["surge_speed"]["untethered"]["fit_percent"] < 90.0
 
 
+@pytest.mark.long
 def test_fig4_lies_on_the_exact_line_at_every_step(tmp_path):
     from subzero.figures import exact_tension
 

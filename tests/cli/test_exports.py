@@ -188,6 +188,7 @@ def test_a_vehicle_without_a_cable_is_written_too(kind, tmp_path):
         assert [one["entities"][0]["id"] for _, one in topics["/scene"]] == ["vehicle"]
 
 
+@pytest.mark.long
 def test_the_command_writes_them_beside_its_files(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     text = scenarios.path("fig6").read_text(encoding="utf-8")

@@ -68,6 +68,7 @@ def test_tethered_is_solid_untethered_dashed_and_measured_are_dots(comparison):
     assert_allclose(line(speed, "measured").get_ydata(), [0.1, 0.9])
 
 
+@pytest.mark.long
 def test_a_measured_channel_without_a_panel_gets_one(comparison):
     values = {name: np.zeros(2) for name in ("cable_tension", "heading", "yaw_rate", "sway_speed")}
     record = Record(source="", time=np.array([0.0, 9.0]), values=values)
@@ -77,6 +78,7 @@ def test_a_measured_channel_without_a_panel_gets_one(comparison):
     assert "measured" not in draw(comparison)
 
 
+@pytest.mark.long
 def test_every_panel_names_its_unit_and_every_figure_its_trial(comparison, make_run):
     figures = [*draw(comparison).values(), *draw({"tethered": make_run(prescribed="dive")}).values()]
     for figure in [*figures, *draw({"tethered": make_run(prescribed="straight")}).values()]:
@@ -150,6 +152,7 @@ def test_a_map_shows_both_directions_in_the_same_scale(comparison):
     assert per_metre[0] == pytest.approx(per_metre[1])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("prescribed", [None, "straight", "dive"])
 def test_a_run_that_stopped_at_once_can_be_drawn(prescribed, make_run, tmp_path):
     for figure in draw({"tethered": make_run(samples=1, prescribed=prescribed)}).values():

@@ -126,6 +126,7 @@ def test_a_failure_while_writing_leaves_nothing_half_written(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_a_prescribed_run_gets_figure_4(tmp_path, rails):
     assert main(["simulate", "fig4", "--out", str(tmp_path)]) == FINE
     assert names(tmp_path) == {

@@ -205,12 +205,14 @@ def test_json_is_one_object_and_it_is_the_summary(here, rails, capsys):
     assert set(summary["files"]) == {path.name for path in (here / "fig6").iterdir()}
 
 
+@pytest.mark.long
 def test_quiet_prints_nothing_and_writes_all(here, rails, capsys):
     reported = said(capsys, "simulate", "fig6", "--quiet")
     assert (reported.out, reported.err) == ("", "")
     assert (here / "fig6" / "tethered.nc").exists()
 
 
+@pytest.mark.long
 def test_verbose_says_what_runs_and_how_long_it_took(here, rails, capsys):
     reported = said(capsys, "simulate", "fig6", "-v")
     assert reported.err.startswith("subzero ")
@@ -225,6 +227,7 @@ def test_a_mistake_is_told_also_quietly(here, capsys):
 # Figures of a file.
 
 
+@pytest.mark.long
 def test_plot_draws_what_is_asked_for_beside_the_run(here, rails, capsys):
     said(capsys, "simulate", "fig6", "--quiet")
     reported = said(capsys, "plot", "fig6/tethered.nc", "--what", "tension", "heading", "--format", "svg").out

@@ -154,6 +154,7 @@ def test_a_heading_measured_whole_turns_away_is_the_same_heading(offset, make_ru
     ).bias == pytest.approx(-offset, abs=1e-9)
 
 
+@pytest.mark.long
 def test_compare_prints_and_stores_the_error_of_each_model(file, rails, capsys, compared):
     path = compared.here / "fig6" / "tethered.csv"
     assert main(["compare", "fig6", "--measured", str(path), "--out", "out"]) == FINE
@@ -221,6 +222,7 @@ def test_a_comparison_asks_what_a_diagnosis_asks(what, file, rails, make_run, ca
     assert len(rails) == (0 if what == "clock" else 2)
 
 
+@pytest.mark.long
 def test_what_the_sidecar_says_is_checked_is_not_asked(file, rails, make_run, tmp_path):
     (tmp_path / "record.toml").write_text('units_checked = ["surge_speed_m_s"]\n')
     record = file(record_of(make_run(), surge_speed=lambda u: 1.944 * u))
@@ -233,6 +235,7 @@ def test_a_comparison_of_no_sample_is_refused(file, rails, capsys):
     assert "none of its samples can be compared: where the runs are, it has gaps" in capsys.readouterr().err
 
 
+@pytest.mark.long
 def test_the_files_given_to_a_command_are_what_is_simulated(rails, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "log.csv").write_text("time_s,surge_speed_m_s,pitch_deg,heading_deg\n0,0.7,0,0\n30,0.7,0,0\n")

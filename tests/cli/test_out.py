@@ -85,6 +85,7 @@ def outcome(folder):
     return json.loads((folder / "summary.json").read_text(encoding="utf-8"))["tethered"]["outcome"]
 
 
+@pytest.mark.long
 def test_a_run_that_stops_never_replaces_one_that_did_not(tmp_path, rails, stops, capsys):
     assert simulate(tmp_path) == FINE
     good = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
@@ -100,6 +101,7 @@ def test_a_run_that_stops_never_replaces_one_that_did_not(tmp_path, rails, stops
     assert {path.name for path in tmp_path.iterdir()} == {*good, "stopped"}
 
 
+@pytest.mark.long
 def test_a_run_that_stops_replaces_one_that_stopped(tmp_path, rails, stops, make_run):
     stops()
     assert simulate(tmp_path) == STOPPED
@@ -107,6 +109,7 @@ def test_a_run_that_stops_replaces_one_that_stopped(tmp_path, rails, stops, make
     assert not (tmp_path / "stopped").exists()
 
 
+@pytest.mark.long
 def test_a_full_disk_is_one_message_and_leaves_the_old_result(tmp_path, rails, capsys):
     assert simulate(tmp_path) == FINE
     before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
@@ -140,6 +143,7 @@ def test_a_result_that_was_being_replaced_is_refused_as_a_record(tmp_path, rails
     assert rails == []
 
 
+@pytest.mark.long
 def test_files_are_in_doubt_until_a_command_writes_them_anew(tmp_path, rails):
     killed(tmp_path)
     assert main(["simulate", "fig6", "--untethered", "--out", str(tmp_path)]) == FINE
@@ -172,6 +176,7 @@ def test_a_full_disk_is_told_whoever_writes(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.long
 def test_an_interrupt_after_the_last_move_is_told_as_it_is(tmp_path, rails, monkeypatch, capsys):
     def interrupted(*_, **__):
         raise KeyboardInterrupt
@@ -181,6 +186,7 @@ def test_an_interrupt_after_the_last_move_is_told_as_it_is(tmp_path, rails, monk
     assert capsys.readouterr().err.endswith(f"Interrupted; all files were written to {tmp_path}.\n")
 
 
+@pytest.mark.long
 def test_a_command_says_nothing_of_a_former_one_in_the_same_process(tmp_path, rails, monkeypatch, capsys):
     """What an interrupted sweep had kept was told of the next command, whose errors would have passed as well."""
     interrupts.set_exit_message(lambda: "3 of 6 members are kept")

@@ -49,6 +49,7 @@ def test_ci_takes_its_test_line_from_the_readme():
     assert all(step in script for step in ("ruff check", "ruff format --check", "mypy", "lint-imports"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("line", COMMANDS)
 def test_every_command_is_understood(line):
     command, bound, _ = app.parse_args(shlex.split(line)[1:], exit_on_error=False, print_error=False)

@@ -29,6 +29,7 @@ def doubtful(rails, monkeypatch, make_run):
     monkeypatch.setattr(sys.modules["subzero.simulation.run"], "simulate", simulate)
 
 
+@pytest.mark.long
 def test_dataset_json_and_terminal_tell_the_same_warnings(doubtful, tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
     assert main(["compare", "fig6", "--out", str(tmp_path)]) == FINE
@@ -56,6 +57,7 @@ def test_strict_writes_everything_and_exits_with_3(words, doubtful, tmp_path, ca
     }
 
 
+@pytest.mark.long
 def test_strict_says_nothing_of_a_run_without_warnings(doubtful, tmp_path, capsys):
     assert main(["simulate", "fig6", "--untethered", "--strict", "--out", str(tmp_path)]) == FINE
     assert "strict" not in capsys.readouterr().err

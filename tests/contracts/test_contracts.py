@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[2]
 
 
@@ -16,6 +18,7 @@ def test_cable_vehicle_and_scenarios_do_not_know_one_another_and_data_flows_one_
     assert " kept, 0 broken." in done.stdout
 
 
+@pytest.mark.long
 def test_the_cable_runs_without_vehicle_scenarios_or_files():
     code = (
         "import sys, cable; cable.pull_out(lambda t: (1.0, 0.0, 0.0), 0.2);"

@@ -32,6 +32,7 @@ def test_no_more_private_words_than_are_allowed(found, kind):
     assert found[kind] <= ALLOWED[kind]
 
 
+@pytest.mark.long
 def test_the_drawn_names_docstrings_and_messages_are_printed():
     for kind, drawn in words.drawn(SEED).items():
         print(f"\n{kind}:", *(" ".join(text.split()) for text in drawn), sep="\n  ")

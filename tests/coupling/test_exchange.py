@@ -183,6 +183,7 @@ def test_a_run_may_start_with_cable_laid_straight_behind_the_vehicle(wet_length,
     assert (np.diff(run["cable_length"].values) > 0.0).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", scenarios.names())
 @pytest.mark.parametrize("tethered", [True, False], ids=["tethered", "untethered"])
 def test_every_shipped_trial_runs_to_its_end(name, tethered, simulate):

@@ -67,6 +67,7 @@ def test_a_straight_surge_on_the_papers_cable_is_the_one_dimensional_one(
     assert_surges_alike(simulate(trial), *surge(trial, hull_alone), 1.5e-3 if drum else 5e-4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mass_per_length", [1.0, 2.0])
 @pytest.mark.parametrize(("step", "tolerance"), [(0.1, 2e-3), (0.05, 6e-4)])
 def test_a_cable_heavier_than_the_vehicle_neither_shakes_it_nor_stops_the_run(
@@ -119,6 +120,7 @@ def test_a_heavy_cable_and_a_turning_vehicle_go_on_without_shaking(trial_of, sim
     assert np.abs(np.diff(side, 2)).max() < 0.1 * np.abs(side).max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("inertia", "friction_torque", "wet_length", "bent"),
     [(2e-3, 2e-3, 0.02, 5e-4), (4e-4, 1e-3, 1e-6, 1e-4)],

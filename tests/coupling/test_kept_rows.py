@@ -26,6 +26,7 @@ def held_against(plain, kept):
         assert same.attrs[what] == kept.attrs[what]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "fields", "every", "times"),
     [

@@ -90,6 +90,7 @@ def test_a_changed_or_missing_answer_is_refused(made, tmp_path):
             reveal(tmp_path)
 
 
+@pytest.mark.long
 def test_a_seed_gives_the_same_record_and_another_seed_another(made):
     what, _ = made
     again, other = challenge("fig6", 3, kind="single"), challenge("fig6", 4, kind="single")
@@ -98,6 +99,7 @@ def test_a_seed_gives_the_same_record_and_another_seed_another(made):
         assert not np.array_equal(what.record.values[name], other.record.values[name], equal_nan=True)
 
 
+@pytest.mark.long
 def test_the_hidden_effect_shows(made):
     what, _ = made
     healthy = hide(what.nominal, (*EFFECTS.values(), *START), what.answer.tolerances, Hidden())

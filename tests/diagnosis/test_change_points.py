@@ -78,6 +78,7 @@ def test_what_began_is_found_with_its_size_and_its_time(found):
     assert all(other.log_posterior < one.log_posterior - 10.0 for other in others)
 
 
+@pytest.mark.long
 def test_a_rudder_to_the_other_side_has_the_other_sign(plant):
     _, _, (one, *_) = hit(plant, -3.0)
     assert one.change_point.effect.id == "rudder_offset"

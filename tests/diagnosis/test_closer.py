@@ -41,6 +41,7 @@ def both_ways(planted):
     return here, none.log_posterior + there.log_gain
 
 
+@pytest.mark.long
 def test_both_ways_agree_where_the_model_hardly_bends(plant):
     here, there = both_ways(plant(weed(-0.004)))
     assert here == pytest.approx(there, abs=1.0), "a nat: what is not linear in so small a force"

@@ -57,6 +57,7 @@ def no_simulation(monkeypatch):
     monkeypatch.setattr(Problem, "tracks", simulated)
 
 
+@pytest.mark.long
 def test_a_verdict_needs_no_simulation_behind_its_findings(found, no_simulation):
     findings, known, more = found
     with pytest.raises(AssertionError, match="simulates nothing"):

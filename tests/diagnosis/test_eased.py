@@ -9,6 +9,7 @@ bit for bit; a thousandth of the noise of a speed log. The runs of the engine ar
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 import subzero
 from subzero.diagnosis import Setting, catalogue
@@ -67,6 +68,7 @@ def weighed(newtons_per_metre):
     return economical(Setting(trial=trial, model=model).with_cable(mass_per_length=mass), 43.0)
 
 
+@pytest.mark.long
 def test_a_run_may_take_many_times_what_the_nominal_one_takes_and_no_more():
     limited, nominal_run = simulator.with_limit(weighed(0.0))
     assert np.array_equal(simulate_track(limited)[1], nominal_run[1])
@@ -75,6 +77,7 @@ def test_a_run_may_take_many_times_what_the_nominal_one_takes_and_no_more():
     assert np.isfinite(simulate_track(replace(heavy, most_work=None))[1]).all(), "... which it need not"
 
 
+@pytest.mark.long
 def test_a_nominal_cable_that_whips_about_may_do_so():
     """A user's heavy cable takes dozens of iterations an exchange, and nothing is wrong with it; one twice as heavy
     takes twice as many.

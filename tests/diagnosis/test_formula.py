@@ -104,6 +104,7 @@ def test_a_wave_is_called_a_wave(estimated):
     assert amplitude == pytest.approx(0.3, rel=0.1)
 
 
+@pytest.mark.long
 def test_the_drag_that_the_model_lacks_is_found_in_a_record(plant, features):
     """X = −0.02 · wet length, far beyond the tolerances, from six noisy channels."""
     force = MissingForce(terms=(Term("X", "wet_length", -0.02),))
@@ -114,6 +115,7 @@ def test_the_drag_that_the_model_lacks_is_found_in_a_record(plant, features):
     assert np.sqrt(np.mean((found.force() - known) ** 2)) < 0.3 * np.abs(known).max()
 
 
+@pytest.mark.long
 def test_a_push_that_rises_and_falls_is_no_box(estimated):
     """Half a sine squared, which is neither of the two: a box in its place would act before and behind it."""
     inside = np.clip((TIMES - 9.0) / 6.0, 0.0, 1.0)

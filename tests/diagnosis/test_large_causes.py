@@ -54,6 +54,7 @@ def test_a_clock_between_the_sizes_that_are_tried_is_seen_from_afar(scenario, la
     assert search.best().ids == ("clock_offset",)
 
 
+@pytest.mark.long
 def test_where_only_wide_tolerances_explain_a_record_the_best_causes_are_fitted_all_the_same():
     """Three numbers are off by five to seven tolerances: no cause by itself comes before that, in the linear problem,
     but it errs by as much as a drum that rubs was behind there, and was never fitted.
@@ -73,6 +74,7 @@ def test_where_only_wide_tolerances_explain_a_record_the_best_causes_are_fitted_
     assert len(search.candidates) > 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("cause", ["clock_offset", "hull_drag", "rudder_offset"])
 def test_the_sensitivity_at_a_tried_size_is_that_of_runs_close_by(cause):
     """Between neighbours a twentieth of the effect's scale to either side, less than a tenth off; at the ends, where

@@ -52,6 +52,7 @@ def test_every_axis_pushes_the_way_it_is_called(axis):
     assert pushed[rate][-1] > plain[rate][-1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("feature", FEATURES)
 def test_every_feature_acts_and_the_energy_balances(feature):
     """On the axis where it does not lead the vehicle astray, of a size of some tenths of a newton."""

@@ -38,6 +38,7 @@ def lagging(plant):
     return planted, survivors(planted, "rudder_lag", "yaw_inertia")
 
 
+@pytest.mark.long
 def test_a_rudder_lag_or_a_yaw_inertia_asks_for_rudder_doublets(lagging):
     planted, left = lagging
     advice = next_trial(planted.problem, left, seed=1)

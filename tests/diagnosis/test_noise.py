@@ -102,6 +102,7 @@ FAMILIES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("family", FAMILIES)
 def test_level_is_found_behind_what_parameters_explain(family):
     step, end, white, slow_sd, lasts = FAMILIES[family]
@@ -183,6 +184,7 @@ def two_channels(seed):
     return Problem(records=(record,), entries=()), Linear(whole, slopes[:, None]), np.ones(1), values, J
 
 
+@pytest.mark.long
 def test_what_parameters_cannot_do_as_another_channel_says_is_noise_of_a_channel():
     problem, linear, D, values, J = two_channels(5)
     depth = refit_noise(problem, linear, D).records[0].noise["depth"]

@@ -63,6 +63,7 @@ def test_no_other_channel_is_read_at_another_time(trial, clean):
     assert np.abs(shown["surge_speed"] - at_once["surge_speed"]).max() > NOISE["surge_speed"]
 
 
+@pytest.mark.long
 def test_a_healthy_record_of_means_has_nothing_wrong(trial, clean):
     assert subzero.diagnose(logged(clean, "averaged"), trial, budget="screen").verdict == "nothing_wrong"
 

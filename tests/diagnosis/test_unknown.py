@@ -82,6 +82,7 @@ def test_a_snag_is_found_on_its_axis_and_its_history_follows(plant):
     assert unknown.force[14] < -0.3 < unknown.force[4], "held back: forward force is negative"
 
 
+@pytest.mark.long
 def test_a_yaw_moment_is_recovered_within_its_band(plant):
     planted = plant(pushed("N", bend), seed=2)
     fit, found = found_in(planted)

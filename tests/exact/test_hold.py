@@ -288,6 +288,7 @@ def unsolved(problems, seed):
     return failed
 
 
+@pytest.mark.long
 def test_of_random_problems_nearly_all_are_solved():
     assert unsolved(400, 1) <= 2
 

@@ -85,6 +85,7 @@ def test_a_stiff_cable_starts_as_quietly(speed):
     assert np.abs(run.tow_force - run.tow_force[0]).max() < 1e-8 * run.tow_tension[0]
 
 
+@pytest.mark.long
 def test_the_lumped_cable_hangs_and_pulls_alike():
     """Masses and springs of the other formulation, `scheme="lumped"`: weight at rest, drag at speed."""
     sinking = cable.CableProperties(mass_per_length=MASSES["sinks"])

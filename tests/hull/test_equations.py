@@ -8,6 +8,7 @@ import subprocess
 import sys
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -27,6 +28,7 @@ print(json.dumps([run.states[-1].tolist(), run.work[-1].tolist()]))
 """
 
 
+@pytest.mark.long
 @settings(max_examples=150, deadline=None)
 @given(
     nu=arrays(float, 6, elements=st.floats(0.05, 3.0)),

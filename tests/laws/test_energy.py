@@ -58,6 +58,7 @@ def unexplained(terms):
     return np.abs(terms["residual"]).max() / np.abs(terms["propeller_work"]).max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [*SCENARIOS, "stop_and_drift"])
 def test_the_ledger_closes_at_every_time(name):
     work = energy(name, "propeller_work")
@@ -70,6 +71,7 @@ def test_fig6_closes_a_hundred_times_better_than_asked():
     assert np.abs(energy("fig6", "residual")).max() <= 1e-5 * energy("fig6", "propeller_work")[-1]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("cable", "drum"),
     [

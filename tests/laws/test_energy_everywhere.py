@@ -68,6 +68,7 @@ def test_little_is_missing_at_half_a_metre_and_a_tenth_of_a_second(name):
     assert missing(name, 1.0) < 1e-3
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", [name for name in PULLS if name != "stretch"])
 def test_what_is_missing_falls_at_least_with_step_and_segment(name):
     slope = np.polyfit(np.log(SHARES), np.log([missing(name, share) for share in SHARES]), 1)[0]

@@ -51,6 +51,7 @@ def test_both_halves_of_a_comparison_repeat_and_are_the_single_runs():
     assert fingerprint(first.untethered) == fingerprint(subzero.simulate("fig6", tethered=False))
 
 
+@pytest.mark.long
 def test_another_process_gives_the_same_bits():
     script = (
         "import subzero, hashlib; run = subzero.simulate('fig6'); "

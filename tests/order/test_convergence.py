@@ -66,6 +66,7 @@ TRIALS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", TRIALS)
 def test_the_error_that_a_run_states_bounds_its_true_error(name):
     run = subzero.simulate(TRIALS[name])
@@ -306,6 +307,7 @@ def test_a_doubt_that_the_first_finer_run_shares_stays_and_says_by_how_much():
     assert "with twice as long ones it is the same" not in said["resolution"]
 
 
+@pytest.mark.long
 def test_a_start_that_finer_runs_contradict_is_not_held_against_them_again():
     reported = accuracy(subzero.simulate(dataclasses.replace(START_FROM_REST, rtol=1e-4)))
     assert reported["start_error"] > 1e-4
@@ -346,6 +348,7 @@ def test_what_is_refused_at_another_resolution_leaves_the_run_as_it_was_asked_fo
     assert found is None or not found.converged
 
 
+@pytest.mark.long
 def test_a_heavy_cable_on_a_free_drum_never_settles_and_says_so():
     run = subzero.simulate(changed("fig6", duration=10.0, cable={"mass_per_length": 0.02}))
     assert accuracy(run)["force_error"] > 0.05

@@ -64,6 +64,7 @@ def followed(trial):
     return run
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 def test_the_vehicle_does_not_feel_it(case):
     trial = CASES[case]()

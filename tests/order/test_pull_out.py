@@ -78,6 +78,7 @@ def test_second_order_in_space(name):
     assert slope(segments[-3:], errors[-3:]) > 1.9
 
 
+@pytest.mark.long
 @every_manoeuvre
 def test_second_order_when_both_are_refined_together(name):
     """Changes between halvings, so that no reference is needed: each is a quarter of the one before."""

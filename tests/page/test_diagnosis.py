@@ -118,6 +118,7 @@ class Reader(HTMLParser):
         return " ".join(" ".join(self.words).split())
 
 
+@pytest.mark.long
 def test_it_answers_what_somebody_asks_who_was_not_there(verdict: Verdict, logged: Logged) -> None:
     read = Reader(page_of(verdict, logged))
     for said in (
@@ -134,6 +135,7 @@ def test_it_answers_what_somebody_asks_who_was_not_there(verdict: Verdict, logge
     )
 
 
+@pytest.mark.long
 def test_texts_of_users_are_text(verdict: Verdict, logged: Logged) -> None:
     read = Reader(page_of(verdict, logged))
     assert read.tags.count("script") == 3  # data, plots, player
@@ -205,12 +207,14 @@ def test_a_record_that_does_not_say_where_it_went_has_no_ghost(verdict: Verdict,
     assert "White" not in said
 
 
+@pytest.mark.long
 def test_an_interrupted_diagnosis_has_its_page_without_a_replay(verdict: Verdict, logged: Logged) -> None:
     read = Reader(page_of(dataclasses.replace(verdict, complete=False), logged))
     assert "canvas" not in read.tags
     assert "this is as far as it came" in read.text
 
 
+@pytest.mark.long
 def test_what_acts_is_said_as_what_it_does(verdict: Verdict, logged: Logged) -> None:
     time = np.linspace(0.0, 6.0, 13)
     rolls = Unknown(axis="K", time=time, force=-0.3 * (time > 3.0), band=np.full(13, 0.02))

@@ -224,6 +224,7 @@ def test_odd_positions_of_sliders_are_ignored_and_the_next_good_one_counts(tmp_p
     assert "Traceback" not in said
 
 
+@pytest.mark.long
 @needs_extra
 @pytest.mark.parametrize(
     "name", ["-x.toml", "a\nb.toml", "\x1b[31m.toml", "../x.toml", "a\\b.toml", "/x.toml", "‮x.toml"]

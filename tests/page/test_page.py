@@ -40,6 +40,7 @@ def read(page: Path) -> Reader:
     return reader
 
 
+@pytest.mark.long
 def test_it_loads_nothing(read: Reader, page: Path) -> None:
     assert all(link.startswith("data:image/svg+xml;base64,") for link in read.links)
     assert "link" not in read.tags

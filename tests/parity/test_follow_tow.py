@@ -76,6 +76,7 @@ def state(line):
     )
 
 
+@pytest.mark.long
 def test_what_the_matrix_says_is_off_by_the_square_of_the_displacement(towed):
     line, work, tow = towed
     errors = []

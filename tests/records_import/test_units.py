@@ -76,6 +76,7 @@ def test_of_200_logs_with_wrong_units_none_is_imported_wrongly_without_a_word(tm
     assert asked > 150
 
 
+@pytest.mark.long
 def test_of_50_logs_in_right_units_all_are_imported_as_they_are(tmp_path):
     for seed in range(50):
         columns = way(np.random.default_rng(seed))

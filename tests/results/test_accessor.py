@@ -18,6 +18,7 @@ def run():
     return subzero.simulate("fig6")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("tethered", [True, False])
 def test_every_figure_can_be_saved(tethered, run, tmp_path):
     drawn = run if tethered else subzero.simulate("fig6", tethered=False)

@@ -70,6 +70,7 @@ CASES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("case", CASES)
 def test_a_run_that_is_broken_off_at_any_file_ends_the_same(case, tmp_path, killed_at):
     trial, options = CASES[case]()

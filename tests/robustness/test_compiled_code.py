@@ -189,6 +189,7 @@ def test_a_folder_that_others_may_write_or_own_is_not_used(run, base, kept, whic
     assert said.count("\n") == 1
 
 
+@pytest.mark.long
 def test_two_processes_that_write_the_same_file_leave_it_whole(base, tmp_path):
     base.mkdir()
     write = f"""
@@ -352,6 +353,7 @@ def test_there_is_none_where_the_code_is_kept_or_there_is_no_core(scaled, monkey
     assert parallel._process == []
 
 
+@pytest.mark.long
 def test_a_second_process_ends_with_a_first_that_is_killed(scaled, tmp_path):
     (tmp_path / "slow").touch()
     code = """

@@ -236,6 +236,7 @@ def copied(swept, tmp_path):
     return tmp_path / "members.sqlite"
 
 
+@pytest.mark.long
 def test_damaged_members_of_a_sweep_are_run_again(swept, tmp_path):
     """One member each has other numbers, other kinds, and a number that it cannot have."""
     with contextlib.closing(sqlite3.connect(copied(swept, tmp_path))) as store, store:

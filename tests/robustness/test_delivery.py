@@ -220,6 +220,7 @@ def test_no_folder_of_the_user_is_ever_removed_whatever_its_name(tmp_path):
     assert tree(tmp_path) == mine | {"project/x/out/a": "new", "project/x/other/a": "new"}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("target", ["elsewhere/.subzero-evil", "victim/.subzero-evil", "victim"])
 def test_a_list_of_incomplete_files_moves_and_removes_nothing(tmp_path, target):
     """A marker in a folder received from elsewhere named a folder, whose files were moved and which was removed."""

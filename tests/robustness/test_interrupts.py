@@ -52,6 +52,7 @@ def interrupted_in_process(seed, count, what):
     return found
 
 
+@pytest.mark.long
 def test_after_an_interrupt_the_next_call_gives_the_same_numbers():
     assert len(interrupted_in_process(1, SHORT, "few")["where"]) > 3
 
@@ -233,6 +234,7 @@ def short(name):
     return {"list": (0.2, []), "simulate": (1.5, sorted(f"out/{file}" for file in files))}[name]
 
 
+@pytest.mark.long
 def test_an_interrupted_command_says_so_and_leaves_all_or_nothing(tmp_path):
     came, _ = interrupt_commands(1, SHORT_COMMANDS, ("simulate", "list"), short, tmp_path)
     assert came.total() == SHORT_COMMANDS
@@ -349,6 +351,7 @@ def linked(script, *words, cache=""):
     )  # fmt: skip
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("nth", ["1", "4"])
 def test_an_interrupt_behind_the_linker_ends_the_call_and_nothing_else(nth):
     """The linker destroys a module; interrupted before Python knew, it was destroyed twice: SIGSEGV a moment later."""

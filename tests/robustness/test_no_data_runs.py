@@ -93,6 +93,7 @@ def test_the_canaries_would_sing(mark, tmp_path):
     assert mark.exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", readers.READERS)
 def test_no_file_runs_what_it_names(name, mark, tmp_path):
     for text in baited(readers.READERS[name], tmp_path, mark):

@@ -198,6 +198,7 @@ def places():
             yield f"{public}.{name}", call, good, name
 
 
+@pytest.mark.long
 def test_an_odd_value_in_any_place_is_refused_in_words_or_legal(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     legal = {(odd, place) for odd, listed in LEGAL.items() for place in listed.split()}

@@ -54,6 +54,7 @@ def test_all_results_of_ten_hours_at_default_steps_are_refused_at_once_with_what
     ), said
 
 
+@pytest.mark.long
 def test_what_is_advised_makes_a_long_run_fit(fig6, little_memory):
     long = dataclasses.replace(fig6, duration=1200.0, cable_step=0.2, rtol=0.0)
     with pytest.raises(subzero.UserError, match="GiB of memory"):

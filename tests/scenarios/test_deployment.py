@@ -127,6 +127,7 @@ def test_a_winch_that_keeps_a_tension_keeps_it(trial_of, simulate):
     assert run["cable_tension"].values[-1] == pytest.approx(expected, rel=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("top, bends", [(0.0, True), (30.0, False)])
 def test_water_that_moves_east_only_near_the_surface_bends_the_upper_cable_east(
     top, bends, trial_of, simulate

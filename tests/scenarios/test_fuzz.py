@@ -134,6 +134,7 @@ def is_usable(trial):
     assert (np.diff(times) > 0.0).all()
 
 
+@pytest.mark.long
 @QUIET
 @given(text=spoiled(FIG6))
 @example(text="a." * 2000 + "a = 1")
@@ -156,6 +157,7 @@ def test_a_spoiled_trial_with_winch_and_vessel_is_a_trial_or_a_scenario_error(tm
         is_usable(trial)
 
 
+@pytest.mark.long
 @QUIET
 @given(text=spoiled(LOG))
 @example(text='"')
@@ -168,6 +170,7 @@ def test_a_spoiled_log_is_a_trial_or_a_scenario_error(tmp_path, text):
         is_usable(trial)
 
 
+@pytest.mark.long
 @QUIET
 @given(text=spoiled(RECORD))
 def test_a_spoiled_record_is_a_motion_or_a_scenario_error(tmp_path, text):
@@ -177,6 +180,7 @@ def test_a_spoiled_record_is_a_motion_or_a_scenario_error(tmp_path, text):
         is_usable(trial)
 
 
+@pytest.mark.long
 @QUIET
 @given(text=spoiled(CABLE))
 def test_a_spoiled_cable_is_a_trial_or_a_scenario_error(tmp_path, text):
@@ -187,6 +191,7 @@ def test_a_spoiled_cable_is_a_trial_or_a_scenario_error(tmp_path, text):
         is_usable(trial)
 
 
+@pytest.mark.long
 @QUIET
 @given(data=st.binary(max_size=200))
 def test_any_bytes_are_a_scenario_error_or_a_trial(tmp_path, data):

@@ -45,6 +45,7 @@ def integral(time, values, until):
     return np.trapezoid(np.interp(at, time, values), at)
 
 
+@pytest.mark.long
 def test_it_reaches_its_end_and_its_diagnostics_are_fine(run):
     assert run.attrs["outcome"] == "completed", run.attrs["outcome_message"]
     found = summarise(run)["diagnostics"]

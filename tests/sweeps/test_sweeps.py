@@ -387,6 +387,7 @@ pool.shutdown()
 """
 
 
+@pytest.mark.long
 def test_a_script_without_a_guard_is_run_once_and_its_functions_go_to_workers(tmp_path):
     (tmp_path / "script.py").write_text(SCRIPT)
     done = subprocess.run(
@@ -623,6 +624,7 @@ def test_a_member_that_takes_much_longer_than_the_others_is_named_with_its_time(
     assert seen[0].slowest == (-1, 0.0)
 
 
+@pytest.mark.long
 def test_each_member_keeps_which_share_of_its_work_finer_runs_took():
     """A cross current on a cable that leaves its drum slack is ill-posed: its refinement ends with the budget."""
     for asked, refined in ((0.0, False), (0.02, True)):

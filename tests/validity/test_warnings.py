@@ -63,6 +63,7 @@ SHIPPED = {"rov_umbilical": {"slack", "bend_radius"}}
 """Scenarios that end with warnings, and why: the umbilical begins with centimetres of cable at a vehicle at rest."""
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("tethered", [True, False], ids=["tethered", "untethered"])
 @pytest.mark.parametrize("name", scenarios.names())
 def test_shipped_scenarios_warn_of_what_is_known_and_of_nothing_else(name, tethered):
@@ -188,6 +189,7 @@ def test_a_drum_that_holds_the_weight_does_not_let_it_unwind():
     assert "ill_posed_drum" not in warned(held)
 
 
+@pytest.mark.long
 def test_a_cable_that_unwinds_against_friction_is_doubted_only_until_a_coarser_run_confirms_it():
     """It comes off faster than the vehicle goes, at a tension of 0.1 N; m1 U² is 0.012 N: well-posed, and converges."""
     cable, drum, start = (
