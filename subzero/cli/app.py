@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from subzero.cli.progress import ProgressBar
+    from subzero.records.record import Record
 
     Runs = dict[str, xr.Dataset]
 
@@ -240,6 +241,7 @@ def compare(
     /,
     *,
     measured: Path | None = None,
+    map: Path | None = None,
     inputs: Inputs = NO_INPUTS,
     kept: Kept = ALL_KEPT,
     check: Flag = False,
@@ -251,6 +253,7 @@ def compare(
     Args:
         scenario: name of a scenario (see "subzero list"), or path of a scenario file.
         measured: CSV file of measured channels, to compare with both runs.
+        map: the measured file is a log as its logger wrote it, with this map of "subzero import".
         inputs: inputs of the simulation besides the scenario.
         kept: results to keep, and where.
         check: run both once more with half the steps and half the segment length, and say what changes.
@@ -258,11 +261,10 @@ def compare(
         output_mode: the form of the output.
     """
     from subzero.cli import write_results
-    from subzero.records.record import read_record
     from subzero.results.netcdf_csv import open_output_folder
 
     trial = inputs.read(scenario)
-    record = read_record(measured) if measured is not None else None
+    record = _measured(measured, map)
     outputs.check()
     folder = kept.folder(kept.of(trial))
     with kept.kept_in(folder) as checkpoint, open_output_folder(folder) as output_folder:
@@ -284,6 +286,21 @@ def compare(
         )
         else STOPPED
     )
+
+
+def _measured(path: Path | None, map: Path | None) -> Record | None:
+    """Return the measured record of a comparison: a file of channels, or a log with its map."""
+    if path is None:
+        if map is not None:
+            raise UserError("--map reads a measured log, and none is given. Add --measured LOG.")
+        return None
+    if map is None:
+        from subzero.records.record import read_record
+
+        return read_record(path)
+    from subzero.logs.api import read_log
+
+    return read_log(path, map)
 
 
 def plot(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.effect import Effect
     from subzero.diagnosis.hypothesis.logged import Logged
     from subzero.diagnosis.results import Verdict
+    from subzero.records.record import Record
 
 FINE, NO_CALIBRATION = 0, 3
 LAST_WORDS_S = 60.0
@@ -88,6 +90,7 @@ def diagnose(
     out: Path = Path("found"),
     effects: Path | None = None,
     commands: Literal["record", "scenario"] | None = None,
+    map: Path | None = None,
     search: Search = FULL_SEARCH,
     output_mode: OutputMode = PLAIN,
 ) -> int:
@@ -100,6 +103,7 @@ def diagnose(
         out: folder for the files.
         effects: Python file with causes of your own (EFFECTS = [...]), besides the catalogue.
         commands: whose commands hold if the record and the scenario differ.
+        map: the files are logs as their loggers wrote them, with this map of "subzero import".
         search: how it is searched.
         output_mode: the form of the output.
     """
@@ -110,7 +114,7 @@ def diagnose(
         scenarios.load(scenario)  # a mistake in it answers at once
     with open_output_folder(out) as output_folder:
         own = _own(effects)
-        logged = _read(records, scenario, commands)
+        logged = _read(_with_map(records, map), scenario, commands)
         from subzero.cli import write_diagnosis
 
         with patience(LAST_WORDS_S):
@@ -134,6 +138,7 @@ def calibrate(
     vehicle: str | None = None,
     out: Path = Path("my_vehicle.toml"),
     commands: Literal["record", "scenario"] | None = None,
+    map: Path | None = None,
     estimation: Estimation = ALL_USUAL,
     output_mode: OutputMode = PLAIN,
 ) -> int:
@@ -146,6 +151,7 @@ def calibrate(
         vehicle: name or file of the vehicle to begin with, instead of the scenario's.
         out: file of the calibrated vehicle; figures and a JSON file are written next to it.
         commands: whose commands hold if the record and the scenario differ.
+        map: the files are logs as their loggers wrote them, with this map of "subzero import".
         estimation: settings of the estimation.
         output_mode: the form of the output.
     """
@@ -158,7 +164,7 @@ def calibrate(
     if scenario is not None:
         scenarios.load(scenario)  # a mistake in it answers at once
     with open_output_folder(out.parent, names) as output_folder:
-        logged = _read(records, scenario, commands)
+        logged = _read(_with_map(records, map), scenario, commands)
         from subzero.calibration.api import calibrate as run
 
         with progress_bar("Calibrating", lambda: COSTS) as progress:
@@ -201,7 +207,7 @@ def challenge(
     with output_mode.emit(output_folder.files()):
         print(output_folder.words())
         print(f"Find it: subzero diagnose {scenario} {out / 'record.csv'}")
-        print(f"Be told: subzero challenge --reveal {out}")
+        print(f"Reveal it: subzero challenge --reveal {out}")
     return FINE
 
 
@@ -210,6 +216,15 @@ def add_to(app: cyclopts.App) -> None:
     register(app, diagnose)
     register(app, calibrate)
     register(app, challenge)
+
+
+def _with_map(files: list[Path], map: Path | None) -> Sequence[Path | Record]:
+    """Return the records of logs that a map reads; without a map the files of records as they are."""
+    if map is None:
+        return files
+    from subzero.logs.api import read_log
+
+    return [read_log(file, map) for file in files]
 
 
 def _sorted(files: list[Path], scenario: str | None) -> tuple[str | None, list[Path]]:
@@ -273,7 +288,7 @@ def _own(path: Path | None) -> tuple[Effect, ...]:
     return load(path)
 
 
-def _read(paths: list[Path], scenario: str | None, commands: str | None) -> list[Logged]:
+def _read(paths: Sequence[Path | Record], scenario: str | None, commands: str | None) -> list[Logged]:
     """Read the records; the compiler is needed to see whether their units are plausible."""
     from subzero.diagnosis.read_trials import read_trials
 

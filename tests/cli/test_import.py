@@ -215,3 +215,40 @@ def test_a_trial_takes_the_commands_of_a_record(tmp_path, monkeypatch):
     trial = subzero.load_scenario("flown.toml")
     assert trial.commands.values[0][0] == 20.0
     assert np.degrees(trial.commands.values[-1][1]) == pytest.approx(2.0)
+
+
+@pytest.fixture
+def log(tmp_path, monkeypatch):
+    """A log in milliseconds and knots, with its map and its record."""
+    monkeypatch.chdir(tmp_path)
+    time = np.arange(0.0, 30.0, 0.5)
+    run = subzero.simulate("fig6")
+    shown = [np.interp(time, run["time"], run[name]) for name in ("heading", "surge_speed", "depth")]
+    rows = "\n".join(
+        f"{1e3 * t:.0f};{h:.3f};{u / 0.514444:.4f};{z:.4f}" for t, h, u, z in zip(time, *shown, strict=True)
+    )
+    Path("log.csv").write_text(f"Time [ms];hdg (deg);Speed (kn);depth (m)\n{rows}\n")
+    assert main(["import", "log.csv"]) == FINE
+
+
+def test_a_log_with_its_map_is_compared_as_its_record(log, capsys):
+    for name, words in (("direct", ["log.csv", "--map", "record.map.toml"]), ("record", ["record.csv"])):
+        assert main(["compare", "fig6", "--quiet", "--out", name, "--measured", *words]) == FINE
+    direct, record = (
+        json.loads(Path(name, "summary.json").read_text())["measured"]["channels"]
+        for name in ("direct", "record")
+    )
+    assert direct.keys() == record.keys() == {"heading", "surge_speed", "depth"}
+    for channel, numbers in direct.items():
+        for label in ("tethered", "untethered"):
+            assert numbers[label] == pytest.approx(
+                record[channel][label], rel=1e-6, abs=1e-8
+            )  # a record has ten digits
+    assert main(["compare", "fig6", "--map", "record.map.toml"]) == MISTAKE
+    assert "Add --measured" in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_a_log_with_its_map_is_diagnosed(log):
+    assert main(["diagnose", "fig6", "log.csv", "--map", "record.map.toml", "--screen", "--quiet"]) == FINE
+    assert main(["diagnose", "fig6", "log.csv", "--map", "missing.toml", "--quiet"]) == MISTAKE
