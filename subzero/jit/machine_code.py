@@ -36,6 +36,7 @@ from subzero.jit.signals import deliver_pending
 
 SUFFIX = ".code"
 UNUSED_S = 30 * 86400.0
+"""Code that no process has used for so long is removed when a new folder is made. [s]"""
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = ("cable", "vehicle", "scenarios", "subzero")
 CORE = (

@@ -149,7 +149,7 @@ def _mat(path: Path, wanted: Wanted, notes: Notes) -> Columns:
 
     try:
         vectors = dict(_vectors("", loadmat(path, simplify_cells=True)))
-    except NotImplementedError:
+    except NotImplementedError:  # scipy refuses version 7.3, which is HDF5
         remedy = "In MATLAB: x = load('log.mat'); save('log.mat', '-struct', 'x', '-v7')."
         raise refusal(path, "it is MATLAB's version 7.3", remedy) from None
     sizes = Counter(vector.size for vector in vectors.values())

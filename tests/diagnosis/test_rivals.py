@@ -38,7 +38,7 @@ def test_the_report_says_what_the_records_allow_and_that_nothing_is_new_in_the_m
     assert "What the records allow (D: how far from what is most probable):" in text
     assert "is the extended model" not in text
     named = dataclasses.replace(undecided(rivals=(SLOPE, NONE)), verdict=CAUSE_NAMED)
-    assert "What else the records allow (D: how far from what is told):" in report.markdown(named, {})
+    assert "What else the records allow (D: how far from the reported one):" in report.markdown(named, {})
     assert report.tables.rivals(undecided(), short=True).header[0] == "what explains the records"
 
 

@@ -65,7 +65,7 @@ class Search(Fits):
             if best.ids in looked:
                 return
             looked.add(best.ids)
-            self._report_progress(0.7, "a further cause beside", best.ids)
+            self._report_progress(0.7, "a further cause with", best.ids)
             self.fit_all(self._more(best) if len(best.ids) < MAX_CAUSES else [], best.fit)
             for without in best.ids:
                 self._without(best, without)

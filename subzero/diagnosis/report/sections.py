@@ -55,7 +55,7 @@ def _explanations(verdict: Verdict) -> list[str | tables.Table]:
     if verdict.rivals:
         undecided = verdict.on_model == UNDECIDED
         what = "What the records allow" if undecided else "What else the records allow"
-        reference = "what is most probable" if undecided else "what is told"
+        reference = "what is most probable" if undecided else "the reported one"
         parts += [f"{what} (D: how far from {reference}):", tables.rivals(verdict)]
     return parts
 
