@@ -26,7 +26,8 @@ INPUTS_LATE = "the inputs are late or early"
 WIDER = 4.0
 """How much wider the tolerances of a calibration are. [-]"""
 TUNED_WIDER = 10.0
-"""How much farther a parameter may be off that was tuned through a channel, where that channel is in error. [-]"""
+"""How much farther a parameter may be off that was tuned through a channel which is not trusted: it is no independent
+evidence on that channel. [-]"""
 GAIN_SCALE = 0.1
 """Usual error of the scale of a sensor (one standard deviation). [-]"""
 OFFSET_LEVELS, DELAY_INTERVALS = 30.0, 5.0
@@ -263,7 +264,7 @@ def _spread(name: str, tolerance: float, terms: Sequence[Term], model: Model) ->
     variance = tolerance**2
     if any(term.kind == "tolerances" for term in terms):
         variance *= WIDER**2
-    if any(term.target in model.tuned_on.get(name, ()) for term in terms if term.is_data_error):
+    if any(not model.channels[channel].trusted for channel in model.tuned_on.get(name, ())):
         variance *= TUNED_WIDER**2
     variance += sum(causes[term.target].changes.get(name, 0.0) ** 2 for term in terms if term.kind == "cause" and math.isinf(term.begins))
     return math.sqrt(variance)

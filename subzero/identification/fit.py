@@ -61,29 +61,44 @@ class Products:
     def __init__(
         self, problem: Problem, terms: Terms, e: Mapping[str, np.ndarray], J: Mapping[str, np.ndarray]
     ) -> None:
-        self._parts: dict[tuple[str, Noise], tuple[np.ndarray, np.ndarray, float, float]] = {}
-        self._problem, self._columns = problem, {}
-        self._times = {}
-        for name in e:
-            used = problem.used(name, terms)
-            self._columns[name] = np.column_stack([J[name][used], e[name][used]])
-            self._times[name] = problem.channels[name].time[used]
+        self._parts: dict[tuple[str, Noise], tuple[np.ndarray, float]] = {}
+        self._resolutions = {name: each.prior.resolution for name, each in problem.channels.items()}
+        self._blocks = {name: _blocks(problem, name, terms, J[name], e[name]) for name in e}
+        self._size = next(iter(J.values())).shape[1] + 1
 
-    def of(self, name: str, noise: Noise) -> tuple[np.ndarray, np.ndarray, float, float]:
-        """Return (A, b, ee, log scale) of a channel with a noise."""
+    def of(self, name: str, noise: Noise) -> tuple[np.ndarray, float]:
+        """Return [J e]ᵀ Σ⁻¹ [J e] and the log scale of a channel with a noise."""
         if (name, noise) not in self._parts:
-            filtered = Filter.of(noise, self._problem.channels[name].prior.resolution, self._times[name])
-            white = filtered.whiten(self._columns[name])
-            G = white.T @ white
-            log_scale = filtered.log_scale + 0.5 * white.shape[0] * np.log(2.0 * np.pi)
-            self._parts[name, noise] = (G[:-1, :-1], G[:-1, -1], float(G[-1, -1]), log_scale)
+            G, log_scale = np.zeros((self._size, self._size)), 0.0
+            for places, times, columns in self._blocks[name]:
+                filtered = Filter.of(noise, self._resolutions[name], times)
+                white = filtered.whiten(columns)
+                G[np.ix_(places, places)] += white.T @ white
+                log_scale += filtered.log_scale + 0.5 * times.size * np.log(2.0 * np.pi)
+            self._parts[name, noise] = (G, log_scale)
         return self._parts[name, noise]
 
     def total(self, noise: Mapping[str, Noise]) -> tuple[np.ndarray, np.ndarray, float, float]:
-        """Return the sums over all channels."""
-        parts = [self.of(name, each) for name, each in noise.items() if name in self._columns]
-        A, b, ee, log_scale = (sum(part[i] for part in parts) for i in range(4))
-        return A, b, ee, log_scale  # type: ignore[return-value]
+        """Return (A, b, ee, log scale), sums over all channels."""
+        parts = [self.of(name, each) for name, each in noise.items() if name in self._blocks]
+        G = np.sum([part[0] for part in parts], axis=0)
+        return G[:-1, :-1], G[:-1, -1], float(G[-1, -1]), sum(part[1] for part in parts)
+
+
+Block = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Of a channel in one record: places of the columns that are not 0 (k,), times (m,), columns (m, k)."""
+
+
+def _blocks(problem: Problem, name: str, terms: Terms, J: np.ndarray, e: np.ndarray) -> list[Block]:
+    """Return a channel record by record: unknown inputs and starts of one change nothing in another."""
+    each, used = problem.channels[name], problem.used(name, terms)
+    found = []
+    for record in np.unique(each.record).tolist():
+        at = used & (each.record == record)
+        columns = np.column_stack([J[at], e[at]])
+        places = np.flatnonzero(np.append(columns[:, :-1].any(axis=0), True))
+        found.append((places, each.time[at], np.ascontiguousarray(columns[:, places])))
+    return found
 
 
 def spreads(entries: Sequence[Entry], levels: Levels) -> np.ndarray:
@@ -364,10 +379,10 @@ def _negative_log_posterior(problem: Problem, linear: Linear) -> float:
     """Return −log of the posterior density at a point, up to constants."""
     total = -problem.log_jacobian(linear.terms)
     for name, e in linear.e.items():
-        used = problem.used(name, linear.terms)
         each = problem.channels[name]
-        filtered = Filter.of(linear.levels.noise[name], each.prior.resolution, each.time[used])
-        total += 0.5 * float(np.sum(filtered.whiten(e[used][:, None]) ** 2))
+        for _, times, columns in _blocks(problem, name, linear.terms, np.empty((e.size, 0)), e):
+            filtered = Filter.of(linear.levels.noise[name], each.prior.resolution, times)
+            total += 0.5 * float(np.sum(filtered.whiten(columns) ** 2))
     return total + 0.5 * float(np.sum((linear.off / spreads(linear.entries, linear.levels)) ** 2))
 
 

@@ -186,6 +186,12 @@ class Cause:
             )
 
 
+    @property
+    def is_effect(self) -> bool:
+        """Whether the function finds it in ``p[id]``: it has numbers of its own, or an onset."""
+        return bool(self.numbers) or self.onset
+
+
 @dataclass(frozen=True)
 class Unknown:
     """An input that nobody knows: where it acts, how large it usually is, and how quickly it changes.
@@ -238,7 +244,8 @@ class Model:
         if not self.channels:
             raise ModelError("the model has no channel: give channels={name: Sensor(...)}.")
         names = [number.name for number in self.parameters]
-        _unique("parameter", [*names, *(cause.id for cause in self.causes)])
+        _unique("cause", [cause.id for cause in self.causes])
+        _unique("parameter or effect", [*names, *(cause.id for cause in self.causes if cause.is_effect)])
         _unique("unknown input", [unknown.name for unknown in self.unknown])
         if "" in names:
             raise ModelError('a parameter has no name: Number("name", value, tolerance=...).')
@@ -264,7 +271,7 @@ class Model:
     def nominal(self) -> dict[str, Any]:
         """Return the nominal parameters, with every cause off."""
         found: dict[str, Any] = {number.name: number.nominal for number in self.parameters}
-        for cause in self.causes:
+        for cause in filter(lambda cause: cause.is_effect, self.causes):
             changes = dict.fromkeys(cause.changes, 0.0) if cause.onset else {}
             on = {name: number.nominal for name, number in cause.numbers.items()}
             found |= effect_numbers(cause, {**changes, **on, **cause.off})

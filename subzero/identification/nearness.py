@@ -124,7 +124,7 @@ def _bends(problem: Problem, fitted: Fit) -> dict[str, float]:
     named = {name for cause in problem.model.causes for name in cause.changes if cause.id in {t.target for t in fitted.terms}}
     calibrated = any(term.kind == "tolerances" for term in fitted.terms)
     found = {
-        entry.name: abs(value - entry.centre) / (entry.sd if calibrated else tolerance[entry.name])
+        entry.name: abs(value - entry.centre) / (entry.sd if calibrated or entry.name in problem.model.tuned_on else tolerance[entry.name])
         for entry, value in zip(fitted.entries, fitted.x.tolist(), strict=True)
         if entry.kind == "number" and entry.name not in named
     }

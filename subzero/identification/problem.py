@@ -89,7 +89,8 @@ class Problem:
             )
         empty = self.entries(())
         for k, run in enumerate(self.runs):
-            run.check(self._asked(k, empty, np.array([entry.centre for entry in empty])))
+            own = [entry for entry in empty if _moves(entry, k)]
+            run.check(self._asked(k, own, np.array([entry.centre for entry in own])))
 
     def with_fixed(self, fixed: Mapping[tuple[str, str, int, int], float]) -> Problem:
         """Return the same problem with more numbers fixed; runs are shared."""
@@ -171,35 +172,42 @@ class Problem:
             return entry
         return replace(entry, centre=self.fixed[entry.identity], sd=FIXED * entry.sd)
 
+    def _readings_of(
+        self, k: int, entries: Sequence[Entry], sets: Sequence[np.ndarray], *, must: bool
+    ) -> list[dict[str, np.ndarray] | None]:
+        """Return readings of record k with sets of entries; only what moves an entry of its own is asked for."""
+        own = [i for i, entry in enumerate(entries) if _moves(entry, k)]
+        mine = [entries[i] for i in own]
+        keys = [x[own].tobytes() for x in sets]
+        new = {key: self._asked(k, mine, x[own]) for key, x in zip(keys, sets, strict=True)}
+        found = dict(zip(new, self.runs[k].readings(list(new.values()), must=must), strict=True))
+        return [found[key] for key in keys]
+
     def _asked(self, k: int, entries: Sequence[Entry], x: np.ndarray) -> Asked:
         """Return the run of record k with entries at x."""
-        numbers, late = _nominal(self.model), 0.0
+        numbers, late = dict(self._nominal), 0.0
         values = {name: np.zeros(knots.size) for name, knots in self.knots[k].items()}
         for entry, value in zip(entries, x.tolist(), strict=True):
-            if entry.record not in (-1, k):
-                continue
-            if entry.name == INPUTS and entry.kind == "delay":
-                late = value
-            if entry.kind in CORRECTIONS:
-                continue
             if entry.kind == "unknown":
                 values[entry.name][entry.knot] = value
-            elif entry.kind == "since":
-                numbers[f"{entry.name}.since"] = value
+            elif entry.kind == "delay":
+                late = value
             else:
-                numbers[entry.name] = value
+                numbers[f"{entry.name}.since" if entry.kind == "since" else entry.name] = value
         time = self.records[k].time
         unknown = {name: np.interp(time, self.knots[k][name], row) for name, row in values.items()}
         return Asked(numbers, unknown, late)
+
+    @cached_property
+    def _nominal(self) -> dict[str, float]:
+        """The numbers of the nominal model, those of its causes off, by their names "cause.number"."""
+        return {name: value for name, value in self.model.nominal().items() if not isinstance(value, dict)}
 
     def residuals(
         self, terms: Terms, entries: Sequence[Entry], sets: Sequence[np.ndarray], *, must: bool = False
     ) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Return channel → residuals (m, k) of k sets of entries, and which sets could be simulated (k,)."""
-        runs = [
-            self.runs[k].readings([self._asked(k, entries, x) for x in sets], must=must)
-            for k in range(len(self.records))
-        ]
+        runs = [self._readings_of(k, entries, sets, must=must) for k in range(len(self.records))]
         valid = np.array([all(of[j] is not None for of in runs) for j in range(len(sets))])
         found = {}
         for name, each in self.channels.items():
@@ -332,9 +340,9 @@ class Problem:
         return (each.time - start) / span - 0.5
 
 
-def _nominal(model: Model) -> dict[str, float]:
-    """Return the numbers of a nominal model, those of its causes off, by their names "cause.number"."""
-    return {name: value for name, value in model.nominal().items() if not isinstance(value, dict)}
+def _moves(entry: Entry, k: int) -> bool:
+    """Return whether an entry changes the simulation of record k."""
+    return entry.record in (-1, k) and (entry.kind not in CORRECTIONS or entry.name == INPUTS)
 
 
 def _input(record: Record, name: str) -> np.ndarray:
