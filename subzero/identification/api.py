@@ -363,7 +363,7 @@ def _notes(problem: Problem, search: Search) -> tuple[str, ...]:
         if spikes:
             why = "outside the record's time, or alone far from both neighbours"
             found.append(f"{name}: {spikes} readings are set aside: {why}.")
-        if not each.prior.declared:
+        if problem.model.channels[name].noise is None:
             found.append(f"{name}: the noise of its sensor, {each.prior.level:.2g}, was read off the record.")
     if not search.complete:
         found.append(

@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from subzero.identification.explanation import (
-    INPUTS,
-    INPUTS_LATE,
+    CLOCK,
+    GAIN_SCALE,
+    OFFSET_LEVELS,
     Term,
     cause_terms,
     data_terms,
@@ -31,6 +32,11 @@ DELAYS_TRIED = 4
 """Delays up to so many usual ones are tried, in steps of half of one."""
 FEWEST_AFTER = 8
 """An error that begins in the middle of a record has so many readings before and after it."""
+SOFT = 3.0
+"""A factor and an offset within so many usual ones are usual. [-]"""
+ANY_FACTOR = 2e-3
+"""Odds that a factor and an offset are those of a regression, which saw the data, over those of any error: their priors
+reach over four decades and a thousand levels, a term's own numbers over a tenth and sixty levels about them. [-]"""
 CAPPED = 25.0
 """Squared residual, in levels of the sensor, beyond which a reading says no more about when an error begins. [-]"""
 OFF_LEVELS = 3.0
@@ -41,13 +47,13 @@ def declared(problem: Problem) -> list[Term]:
     """Return the terms that a model declares, and those that its channels may have throughout."""
     model = problem.model
     duration = max(float(np.ptp(record.time)) for record in problem.records)
-    data = [term for term in data_terms(model) if term.target in (*problem.channels, INPUTS)]
+    data = [term for term in data_terms(model) if term.target in (*problem.channels, CLOCK)]
     return [*cause_terms(model, duration), tolerance_term(model), *data]
 
 
 def suggested(problem: Problem, linear: Linear, terms: list[Term]) -> list[Term]:
     """Return which of some terms are worth a look at a point, and those that its residuals suggest."""
-    found = [term for term in terms if term.kind not in ("unit", "delay") or term.target == INPUTS]
+    found = [term for term in terms if term.kind not in ("unit", "delay") or term.target == CLOCK]
     for name in problem.channels:
         if problem.model.channels[name].trusted:
             continue
@@ -79,7 +85,7 @@ def _of_channel(problem: Problem, linear: Linear, name: str, own: list[Term]) ->
 
 
 def _delays(problem: Problem, linear: Linear, name: str, own: list[Term]) -> Iterator[Term]:
-    """Yield a delay of a channel, and of the inputs, that begin at the delay which leaves least of the channel."""
+    """Yield a delay of a channel that begins at the delay which leaves least of it."""
     (term,) = [term for term in own if term.kind == "delay"]
     terms = with_term(linear.terms, term)
     entries = problem.entries(terms)
@@ -92,8 +98,6 @@ def _delays(problem: Problem, linear: Linear, name: str, own: list[Term]) -> Ite
     used = problem.used(name, terms)
     size = float(sizes[np.argmin(np.mean(found[name][used] ** 2, axis=0))])
     yield replace(term, size=size)
-    if problem.model.inputs:
-        yield replace(term, id=f"delay:{INPUTS}", sentence=INPUTS_LATE, target=INPUTS, size=size)
 
 
 def _wrapped(values: np.ndarray, turn: float) -> np.ndarray:
@@ -110,7 +114,10 @@ def _regression(problem: Problem, name: str, simulated: np.ndarray, used: np.nda
     if abs(b) < 1e-3 or b**2 * spread**2 < 0.5 * float(np.var(y)):
         return None
     a = float(np.mean(y - b * h))
-    odds = 0.1 * data_odds(problem)
+    usual = (abs(b - 1.0) < SOFT * GAIN_SCALE, abs(a) < SOFT * OFFSET_LEVELS * problem.levels[name])
+    if all(usual):  # an offset or an error of scale serves
+        return None
+    odds = ANY_FACTOR * data_odds(problem)
     return Term(
         f"affine:{name}", f"{name} has another scale and zero", "affine", name, odds, factor=b, offset=a
     )

@@ -19,10 +19,8 @@ import numpy as np
 
 from subzero.identification.model import Cause, Model
 
-INPUTS = "inputs"
-"""Target of an error of the clock of a record's inputs."""
-INPUTS_LATE = "the inputs are late or early"
-"""What it says."""
+CLOCK = "clock"
+"""Target of an error of the clock of all channels together."""
 WIDER = 4.0
 """How much wider the tolerances of a calibration are. [-]"""
 TUNED_WIDER = 10.0
@@ -221,7 +219,7 @@ def data_terms(model: Model) -> list[Term]:
             ("scale", "has an error of scale"),
             ("affine", "has another scale and zero"),
         ]
-        soft += [("drift", "drifts"), ("delay", "is late or early")]
+        soft += [("drift", "drifts"), ("delay", "is late or early against the inputs")]
         found += [
             Term(f"{kind}:{name}", f"{name} {words}", kind, name, odds / len(soft)) for kind, words in soft
         ]
@@ -237,8 +235,9 @@ def data_terms(model: Model) -> list[Term]:
             )
             for factor, offset, words in known
         ]
-    if model.inputs:
-        found.append(Term(f"delay:{INPUTS}", INPUTS_LATE, "delay", INPUTS, PRIOR_DATA / 5.0))
+    if len(suspects) > 1 and len(suspects) == len(model.channels):
+        sentence = "all channels are late or early, or the inputs early or late"
+        found.append(Term(f"delay:{CLOCK}", sentence, "delay", CLOCK, PRIOR_DATA / 5.0))
     return found
 
 

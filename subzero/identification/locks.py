@@ -1,5 +1,8 @@
-"""Locks on a name, besides its probability: it must improve the prediction of what was not fitted, with each record
-left out, and survive wider tolerances.
+"""Locks on a name, besides its probability: the prediction of what was not fitted.
+
+Of records that were held out the prediction must surely improve. Where the record itself is divided, it must not surely
+get worse: other parameters may bend so far that a short last part looks the same. (Wider tolerances are a term of the
+search: what they explain as well is undecided there.)
 
     gain = Σ (e/ν)² without the term − Σ (e/ν)² with it     in free simulation of readings that were not fitted
 
@@ -14,17 +17,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from subzero.identification.explanation import Entry, Term, Terms, tolerance_term, with_term, without
-from subzero.identification.fit import Fit, fit, free_fit
+from subzero.identification.explanation import Entry, Term, Terms, without
+from subzero.identification.fit import Fit, free_fit
 from subzero.identification.problem import Problem
 from subzero.identification.record import Record
 
 FITTED_SHARE = 0.6
 """Share of a single record that is fitted, where the rest is predicted. [-]"""
 BLOCKS, DRAWS, SURE = 20, 2000, 0.05
-"""Blocks of a record, draws of the bootstrap, and the quantile that must be above 0."""
-ALIVE = 2.0
-"""Least gain of a term in log evidence where all tolerances are wider. [nats]"""
+"""Blocks of a record, draws of the bootstrap, and the share of them outside an interval, to either side."""
 
 
 @dataclass(frozen=True)
@@ -33,19 +34,22 @@ class Gain:
 
     Attributes:
         before, after: root mean square of residuals in free simulation, in levels of the sensors.
-        low: lower end of an interval of the improvement of the mean square, in squared levels.
+        low, high: interval of the improvement of the mean square, in squared levels.
         what: the readings that were predicted.
+        strict: whether records were held out.
     """
 
     before: float
     after: float
     low: float
+    high: float
     what: str
+    strict: bool
 
     @property
     def holds(self) -> bool:
-        """Whether the improvement is surely there."""
-        return self.low > 0.0
+        """Whether the prediction improves: surely, if records were held out; else not surely for the worse."""
+        return (self.low if self.strict else self.high) > 0.0
 
 
 @dataclass(frozen=True)
@@ -54,12 +58,10 @@ class Locks:
 
     Attributes:
         gain: on what was not fitted; None if that cannot be tried, as it begins too late.
-        alive: gain in log evidence where tolerances are wider. [nats]
         reasons: why it may not be named; () if it may.
     """
 
     gain: Gain | None
-    alive: float
     reasons: tuple[str, ...]
 
 
@@ -72,24 +74,13 @@ def locks(problem: Problem, best: Fit, held_out: Sequence[Record]) -> dict[str, 
 
 def _locks(problem: Problem, best: Fit, term: Term, held_out: Sequence[Record]) -> Locks:
     gain = held_out_gain(problem, best, term, held_out)
-    alive = _alive(problem, best, term)
     reasons = []
     if gain is not None and not gain.holds:
         reasons.append(
             f"it does not surely predict {gain.what}: {gain.before:.2f} levels of the sensors without it, "
             f"{gain.after:.2f} with it"
         )
-    if alive < ALIVE:
-        reasons.append("wider tolerances of the parameters explain as much")
-    return Locks(gain, alive, tuple(reasons))
-
-
-def _alive(problem: Problem, best: Fit, term: Term) -> float:
-    """Return the gain of a term in log evidence where tolerances are wider, and begin where they are best."""
-    wider = tolerance_term(problem.model)
-    having = fit(problem, with_term(best.terms, wider), best.values, best.linear.levels)
-    lacking = fit(problem, with_term(without(best.terms, term), wider), best.values, best.linear.levels)
-    return having.log_evidence - lacking.log_evidence
+    return Locks(gain, tuple(reasons))
 
 
 def held_out_gain(problem: Problem, best: Fit, term: Term, held_out: Sequence[Record]) -> Gain | None:
@@ -119,7 +110,7 @@ def held_out_gain(problem: Problem, best: Fit, term: Term, held_out: Sequence[Re
         what = "the last part of the record by a fit of the first"
     having = _predicted(problem, best, best.terms, folds)
     lacking = _predicted(problem, best, without(best.terms, term), folds)
-    return _gain(having, lacking, what)
+    return _gain(having, lacking, what, strict=bool(held_out))
 
 
 Fold = tuple[Sequence[Record], Sequence[Record], float]
@@ -147,18 +138,17 @@ def _shared(best: Fit) -> dict[Entry, float]:
     return {entry: value for entry, value in best.values.items() if entry.record < 0}
 
 
-def _gain(having: Sequence[np.ndarray], lacking: Sequence[np.ndarray], what: str) -> Gain:
+def _gain(having: Sequence[np.ndarray], lacking: Sequence[np.ndarray], what: str, *, strict: bool) -> Gain:
     """Return the gain between squared residuals with and without a term, with its bootstrap interval."""
     better = np.concatenate([b - a for a, b in zip(having, lacking, strict=True)])
     blocks = np.array([np.mean(part) for part in np.array_split(better, min(BLOCKS, better.size))])
     draws = np.random.default_rng(0).integers(0, blocks.size, (DRAWS, blocks.size))
-    low = (
-        float(np.quantile(blocks[draws].mean(axis=1), SURE))
-        if np.isfinite(blocks).all()
-        else _sign(having, lacking)
-    )
+    means = blocks[draws].mean(axis=1)
+    low, high = (float(np.quantile(means, share)) for share in (SURE, 1.0 - SURE))
+    if not np.isfinite(blocks).all():
+        low = high = _sign(having, lacking)
     before, after = (float(np.sqrt(np.mean(np.concatenate(rows)))) for rows in (lacking, having))
-    return Gain(before, after, low, what)
+    return Gain(before, after, low, high, what, strict)
 
 
 def _sign(having: Sequence[np.ndarray], lacking: Sequence[np.ndarray]) -> float:

@@ -106,6 +106,7 @@ class Sensor:
 
     Attributes:
         noise: standard deviation of its error from sample to sample; None if it is to be read off the record. [unit]
+        spread: how well that is known: standard deviation of its logarithm. [-]
         unit: as it is shown; an angle is in "rad" or "deg".
         angle: whether whole turns make no difference.
         resolution: what it rounds to; None if it is to be read off the record. [unit]
@@ -115,6 +116,7 @@ class Sensor:
     """
 
     noise: float | None = None
+    spread: float = 0.1
     unit: str = ""
     angle: bool = False
     resolution: float | None = None
@@ -126,6 +128,7 @@ class Sensor:
     def __post_init__(self) -> None:
         if self.noise is not None:
             positive("the noise of a sensor", self.noise)
+        positive("the spread of the noise of a sensor", self.spread)
         if self.resolution is not None and finite("the resolution of a sensor", self.resolution) < 0.0:
             raise ModelError(f"the resolution of a sensor is {self.resolution!r}; it must not be negative.")
         if not self.low < self.high:

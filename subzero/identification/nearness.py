@@ -18,8 +18,8 @@ import numpy as np
 from subzero.identification.fit import Fit
 from subzero.identification.problem import Problem
 
-NEAR_LEFT = 1.5
-"""Largest ratio of what is left, after the unknown inputs, to the level of a sensor. [-]"""
+NEAR_LEFT = 1.4
+"""Largest ratio of what is left, after the unknown inputs, to the most that a sensor errs. [-]"""
 NEAR_SIZE = 3.0
 """Largest ratio of an unknown input's size to the declared one. [-]"""
 NEAR_BEND = 4.0
@@ -34,6 +34,7 @@ class Left:
         channel: its name.
         unit: as it is shown.
         level: of its sensor.
+        most: that it errs, as well as that is known.
         free: left by a free simulation, unknown inputs at 0.
         followed: left where the unknown inputs follow the record.
     """
@@ -41,6 +42,7 @@ class Left:
     channel: str
     unit: str
     level: float
+    most: float
     free: float
     followed: float
 
@@ -81,10 +83,10 @@ def nearness(problem: Problem, fitted: Fit, free: Fit) -> Nearness:
     }
     bends = _bends(problem, fitted)
     reasons = [
-        f"{each.channel}: {each.followed:.3g} {each.unit} are left, {each.followed / each.level:.1f} times what its "
-        f"sensor may err ({each.level:.3g})"
+        f"{each.channel}: {each.followed:.3g} {each.unit} are left, {each.followed / each.most:.1f} times what its "
+        f"sensor may err ({each.most:.3g})"
         for each in left
-        if each.followed > NEAR_LEFT * each.level
+        if each.followed > NEAR_LEFT * each.most
     ]
     reasons += [
         f"the model misses an input {name!r} of {size:.3g}, {size / declared:.1f} times the declared size"
@@ -106,6 +108,7 @@ def left_by(problem: Problem, fitted: Fit, free: Fit) -> list[Left]:
             name,
             problem.model.channels[name].unit,
             problem.levels[name],
+            problem.levels[name] * float(np.exp(problem.channels[name].prior.spread)),
             rms(free.linear.e[name][used]),
             rms(fitted.linear.e[name][used]),
         )

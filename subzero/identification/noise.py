@@ -14,17 +14,14 @@ import numpy as np
 
 from subzero.jit import compiled
 
-DECLARED_SPREAD, OPEN_SPREAD = 0.1, 1.0
-"""Standard deviation of log σ_w about a declared level, and about one that was read off the record. [-]"""
+OPEN_SPREAD = 1.0
+"""Standard deviation of log σ_w about a level that was read off the record. [-]"""
 BINDING = 5.0
-"""A declared level binds: σ_w is no farther from it, in standard deviations of its logarithm. [-]"""
+"""A level binds: σ_w is no farther from it, in standard deviations of its logarithm. [-]"""
 SLOW_SHARE, SLOW_SPREAD = 0.3, 0.7
-"""Usual slow part of a sensor, over its level, and the standard deviation of its logarithm; it never exceeds the
-level: what is slow and larger is no noise of a sensor. [-]"""
+"""Usual slow part of a sensor, over its level, and the standard deviation of its logarithm. [-]"""
 TIME_SPREAD = 1.0
 """Standard deviation of log τ_s about ten sampling intervals. [-]"""
-MAX_SLOW = 1.0
-"""Largest slow part, over the level. [-]"""
 FLOOR_SHARE = 1e-6
 """Least level of a sensor whose noise was neither declared nor is seen, over the spread of its readings. [-]"""
 
@@ -40,12 +37,24 @@ class Noise:
 
 @dataclass(frozen=True)
 class NoisePrior:
-    """What is known of a sensor before a fit: level and resolution [unit], interval of samples [s]."""
+    """What is known of a sensor before a fit.
+
+    Attributes:
+        level: usual σ_w. [unit of the channel]
+        resolution: q. [unit of the channel]
+        interval: of its samples. [s]
+        spread: standard deviation of the logarithm of its level. [-]
+    """
 
     level: float
     resolution: float
     interval: float
-    declared: bool
+    spread: float
+
+    @property
+    def most(self) -> float:
+        """The level at its upper end: a slow part that is larger is no noise of a sensor. [unit of the channel]"""
+        return self.level * float(np.exp(self.spread))
 
     def usual(self) -> Noise:
         """Return the noise at its median."""
@@ -53,13 +62,10 @@ class NoisePrior:
 
     def log_density(self, noise: Noise) -> float:
         """Return the log prior density of a noise, up to a constant."""
-        if noise.slow > MAX_SLOW * self.level * (1.0 + 1e-9):
+        if noise.slow > self.most or abs(np.log(noise.white / self.level)) > BINDING * self.spread:
             return -np.inf
-        if self.declared and abs(np.log(noise.white / self.level)) > BINDING * DECLARED_SPREAD:
-            return -np.inf
-        spread = DECLARED_SPREAD if self.declared else OPEN_SPREAD
         off = (
-            np.log(noise.white / self.level) / spread,
+            np.log(noise.white / self.level) / self.spread,
             np.log(noise.slow / (SLOW_SHARE * self.level)) / SLOW_SPREAD,
             np.log(noise.time / (10.0 * self.interval)) / TIME_SPREAD,
         )

@@ -11,9 +11,9 @@ from types import MappingProxyType
 import numpy as np
 
 from subzero.errors import UserError
-from subzero.identification.explanation import INPUTS, Entry, Term, Terms, entries_of
+from subzero.identification.explanation import CLOCK, Entry, Term, Terms, entries_of
 from subzero.identification.model import Model
-from subzero.identification.noise import NoisePrior, level_of, resolution_of
+from subzero.identification.noise import OPEN_SPREAD, NoisePrior, level_of, resolution_of
 from subzero.identification.record import Record
 from subzero.identification.simulation import Asked, Runs
 
@@ -121,7 +121,8 @@ class Problem:
         step = sensor.resolution if sensor.resolution is not None else resolution_of(values)
         level = sensor.noise if sensor.noise is not None else level_of(values, step)
         steps = np.diff(time)
-        prior = NoisePrior(level, step, float(np.median(steps[steps > 0.0])), sensor.noise is not None)
+        spread = OPEN_SPREAD if sensor.noise is None else sensor.spread
+        prior = NoisePrior(level, step, float(np.median(steps[steps > 0.0])), spread)
         used = finite & ~_spikes(values, SPIKE * max(level, step), sensor.turn)
         return Readings(time, values, of, used, prior)
 
@@ -131,13 +132,13 @@ class Problem:
         return {
             name: float(np.hypot(each.prior.level, each.prior.resolution / np.sqrt(12.0)))
             for name, each in self.channels.items()
-        } | {INPUTS: 1.0}
+        } | {CLOCK: 1.0}
 
     @cached_property
     def intervals(self) -> dict[str, float]:
         """Channel → its sampling interval. [s]"""
         own = {name: each.prior.interval for name, each in self.channels.items()}
-        return {**own, INPUTS: float(np.median(np.diff(self.records[0].time)))}
+        return {**own, CLOCK: float(np.median(np.diff(self.records[0].time)))}
 
     @cached_property
     def knots(self) -> list[dict[str, np.ndarray]]:
@@ -187,18 +188,16 @@ class Problem:
 
     def _asked(self, k: int, entries: Sequence[Entry], x: np.ndarray) -> Asked:
         """Return the run of record k with entries at x."""
-        numbers, late = dict(self._nominal), 0.0
+        numbers = dict(self._nominal)
         values = {name: np.zeros(knots.size) for name, knots in self.knots[k].items()}
         for entry, value in zip(entries, x.tolist(), strict=True):
             if entry.kind == "unknown":
                 values[entry.name][entry.knot] = value
-            elif entry.kind == "delay":
-                late = value
             else:
                 numbers[f"{entry.name}.since" if entry.kind == "since" else entry.name] = value
         time = self.records[k].time
         unknown = {name: np.interp(time, self.knots[k][name], row) for name, row in values.items()}
-        return Asked(numbers, unknown, late)
+        return Asked(numbers, unknown)
 
     @cached_property
     def _nominal(self) -> dict[str, float]:
@@ -227,7 +226,9 @@ class Problem:
     ) -> np.ndarray:
         """Return simulated readings of a channel at its times (m,)."""
         each = self.channels[name]
-        late = sum(x[i] for i, entry in enumerate(entries) if entry.kind == "delay" and entry.name == name)
+        late = sum(
+            x[i] for i, entry in enumerate(entries) if entry.kind == "delay" and entry.name in (name, CLOCK)
+        )
         found = np.empty(each.values.size)
         for k, record in enumerate(self.records):
             at = each.record == k
@@ -357,7 +358,7 @@ class Problem:
 
 def _moves(entry: Entry, k: int) -> bool:
     """Return whether an entry changes the simulation of record k."""
-    return entry.record in (-1, k) and (entry.kind not in CORRECTIONS or entry.name == INPUTS)
+    return entry.record in (-1, k) and entry.kind not in CORRECTIONS
 
 
 def _input(record: Record, name: str) -> np.ndarray:

@@ -15,17 +15,15 @@ KEPT = 2000
 
 
 class Asked(NamedTuple):
-    """A run: numbers by name, causes' numbers included; unknown inputs at the times (n,); delay of the inputs [s]."""
+    """A run: numbers by name, causes' numbers included, and unknown inputs at the times (n,)."""
 
     numbers: Mapping[str, float]
     unknown: Mapping[str, np.ndarray]
-    late: float = 0.0
 
     @property
     def key(self) -> tuple[Any, ...]:
         """What makes it another run."""
         return (
-            self.late,
             tuple(self.numbers.values()),
             *(values.tobytes() for values in self.unknown.values()),
         )
@@ -78,24 +76,18 @@ class Runs:
         self.count += len(runs)
         if self.model.batch and runs:
             return self._batch(runs)
-        return [self._checked(self._call(run.numbers, run.unknown, run, [run.late]), run, 0) for run in runs]
+        return [self._checked(self._call(run.numbers, run.unknown, run), run, 0) for run in runs]
 
     def _batch(self, runs: Sequence[Asked]) -> list[dict[str, np.ndarray]]:
         numbers = {name: np.array([run.numbers[name] for run in runs]) for name in runs[0].numbers}
         unknown = {name: np.stack([run.unknown[name] for run in runs], axis=1) for name in runs[0].unknown}
-        late = [run.late for run in runs]
-        found = self._call(numbers, unknown, runs[0], late if len(set(late)) > 1 else late[:1])
+        found = self._call(numbers, unknown, runs[0])
         return [self._checked(found, run, len(runs), k) for k, run in enumerate(runs)]
 
-    def _delayed(self, values: np.ndarray, late: Sequence[float]) -> np.ndarray:
-        """Return an input with delays: (n,), or (n, delays) for a batch."""
-        shifted = [np.interp(self.time - each, self.time, values) if each else values for each in late]
-        return np.stack(shifted, axis=1) if self.model.batch else shifted[0]
-
-    def _call(
-        self, numbers: Mapping[str, Any], unknown: Mapping[str, Any], run: Asked, late: Sequence[float]
-    ) -> Mapping[str, Any]:
-        inputs: dict[str, Any] = {name: self._delayed(values, late) for name, values in self.inputs.items()}
+    def _call(self, numbers: Mapping[str, Any], unknown: Mapping[str, Any], run: Asked) -> Mapping[str, Any]:
+        inputs: dict[str, Any] = {
+            name: values[:, None] if self.model.batch else values for name, values in self.inputs.items()
+        }
         for name, values in unknown.items():
             of = name.removeprefix(COMMAND)
             inputs[of] = inputs[of] + values if name.startswith(COMMAND) else values

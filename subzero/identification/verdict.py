@@ -34,8 +34,8 @@ HEADLINES = {
     NOTHING_NEAR: "The model is not near these records. Nothing is named.",
 }
 
-SHOWN = 5
-"""So many explanations are shown."""
+SHOWN, SIZES_SHOWN = 5, 12
+"""So many explanations are shown; and so many sizes that would be seen."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,9 @@ class Verdict:
         lines += _budget_lines(self.budget, self.remainder)
         if self.visible_from and self.verdict in (NOTHING_WRONG, CALIBRATED, UNDECIDED):
             lines += ["", "What would be seen, if it were there, from this size on:"]
-            lines += [f"  {name}: {size}" for name, size in self.visible_from.items()]
+            lines += [f"  {name}: {size}" for name, size in list(self.visible_from.items())[:SIZES_SHOWN]]
+            if len(self.visible_from) > SIZES_SHOWN:
+                lines.append(f"  … {len(self.visible_from) - SIZES_SHOWN} more in verdict.visible_from")
         lines += [f"Note: {note}" for note in self.notes]
         return "\n".join(lines)
 

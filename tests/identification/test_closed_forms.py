@@ -117,6 +117,6 @@ def test_the_level_of_white_noise_on_a_slow_signal_is_read_off_a_record():
 
 
 def test_a_declared_level_binds():
-    prior = NoisePrior(level=0.1, resolution=0.0, interval=0.1, declared=True)
+    prior = NoisePrior(level=0.1, resolution=0.0, interval=0.1, spread=0.1)
     assert prior.log_density(Noise(0.3, 0.03, 1.0)) == -np.inf
     assert prior.log_density(Noise(0.11, 0.03, 1.0)) > -2.0

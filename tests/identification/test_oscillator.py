@@ -95,15 +95,14 @@ def test_a_sensor_that_stands_still_is_named_and_only_that():
 
 
 @pytest.mark.long
-def test_an_input_that_is_late_is_found_with_its_delay():
+def test_a_clock_that_is_late_against_the_inputs_is_found_with_its_delay():
     seen = record(3)
     late = 0.3
-    force = np.interp(seen.time + late, seen.time, seen.columns["force"])
-    verdict = sd.diagnose(changed(seen, force=force), model())
-    told = {each.id: each for each in verdict.named + verdict.suspected}
-    assert set(told) <= {"delay:inputs", "delay:x"}
-    delays = [e.value for each in told.values() for e in each.estimates]
-    assert delays[0] == pytest.approx(late, abs=0.05)
+    x = np.interp(seen.time - late, seen.time, seen.columns["x"])
+    verdict = sd.diagnose(changed(seen, x=x), model())
+    (found,) = verdict.named
+    assert found.id == "delay:x"
+    assert estimate(verdict, "delay").value == pytest.approx(late, abs=0.02)
 
 
 @pytest.mark.long
