@@ -37,6 +37,7 @@ from cable.properties import CableProperties
 from cable.pull_out import SCHEMES, pull_out, tow
 from cable.schemes import Equation7, Lumped, MovingEnd, Paper
 from cable.task import MovingDrum
+from cable.tether import Tether, TetherError, TetherState
 from cable.winch import Brake, ConstantTension, PayOutRate
 
 __all__ = [
@@ -56,6 +57,9 @@ __all__ = [
     "Outcome",
     "Paper",
     "PayOutRate",
+    "Tether",
+    "TetherError",
+    "TetherState",
     "hold",
     "pull_out",
     "tow",
