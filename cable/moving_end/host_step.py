@@ -140,7 +140,21 @@ def advance(
     if refused != FINE:
         return refused
     held.kept[:] = held.memory
+    ending = _reach(held, dt, ends, control, asked, most, rtol)
+    # Of a slack cable in very short steps there may be no solution, while the step of the host has one.
+    if ending == FAILED and rtol > 0.0:
+        held.memory[:] = held.kept
+        ending = _reach(held, dt, ends, control, asked, most, 0.0)
+    return ending
+
+
+@allocating
+def _reach(
+    held: Any, dt: float, ends: np.ndarray, control: int, asked: np.ndarray, most: float, rtol: float
+) -> int:
+    """Go to the end of a step, in inner steps that err by `rtol`; return how it ended."""
     _lead(held, dt, ends, control, asked)
+    _turn_winch(held.line, dt, control, asked)
     now, path, line = held.now, held.path, held.line
     suggested = now[SUGGESTED] if now[SUGGESTED] > 0.0 else FIRST_STEP * dt
     suggested = cover(
@@ -167,6 +181,7 @@ def attempt(
         return refused
     if not again:
         held.kept[:] = held.memory
+    _turn_winch(held.line, dt, control, asked)
     drum, line, tow = held.drum, held.line, np.empty(3)
     drum.control, drum.setpoint = control, asked[1]
     for i in range(3):
@@ -225,10 +240,7 @@ def _refusal(held: Any, dt: float, ends: np.ndarray, most: float) -> int:
 @allocating
 def _lead(held: Any, dt: float, ends: np.ndarray, control: int, asked: np.ndarray) -> None:
     """Write the motion of both ends in a step, and what the winch is asked for."""
-    path, led, ends_now = held.path, held.led, held.line.ends
-    if control == LENGTH and ends_now.time == 0.0 and ends_now.previous_step == 0.0:
-        for level in range(3):  # a winch that turns from the start on has turned before
-            ends_now.payout[level] = (asked[1] - asked[0]) / dt
+    path, led = held.path, held.led
     path.times[0] = path.times[1]
     path.times[1] = path.times[0] + dt
     led[0, 0], led[1, 0] = path.times[0], path.times[1]
@@ -240,6 +252,14 @@ def _lead(held: Any, dt: float, ends: np.ndarray, control: int, asked: np.ndarra
             led[1, PLACE + i], led[1, VELOCITY + i] = ends[1, 0, i] - held.origin[i], ends[1, 1, i]
     led[0, SETPOINT], led[1, SETPOINT] = asked[0], asked[1]
     held.drum.control = control
+
+
+@inner
+def _turn_winch(line: Line, dt: float, control: int, asked: np.ndarray) -> None:
+    """Let a winch that turns from the start on have turned before."""
+    if control == LENGTH and line.ends.time == 0.0 and line.ends.previous_step == 0.0:
+        for level in range(3):
+            line.ends.payout[level] = (asked[1] - asked[0]) / dt
 
 
 def packed(parts: Sequence[Any]) -> tuple[np.ndarray, list[Any]]:
