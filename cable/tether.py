@@ -20,7 +20,7 @@ Tethers share nothing, and a step runs without Python's lock: many threads may s
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from typing import Any
 from uuid import uuid4
@@ -527,8 +527,10 @@ def _at_rest(
     current: Current,
     drum: DrumNumbers,
 ) -> Line:
-    """Return a line that hangs or streams between its ends, which move on as they do."""
-    rest = hold(states[:, 0], length, current, cable=cable, segment_length=each)
+    """Return a line that hangs or streams between its ends as if they went on at their mean velocity."""
+    moving = states[:, 1].mean(axis=0)
+    passing = replace(current, velocity=current.velocity - moving) if moving.any() else current
+    rest = hold(states[:, 0], length, passing, cable=cable, segment_length=each)
     line = new_line(rest.segment_lengths.size + SPARE)
     line.ends.layout.segment_length = float(rest.segment_lengths[0])
     drum.velocity[:] = states[1, 1]

@@ -6,6 +6,7 @@ gives the places that the other run has, and takes its steps (rtol = 0). Toleran
 there velocities enter, which `cable.pull_out` samples a billionth of a step before and after each time.
 """
 
+import dataclasses
 import json
 import os
 import subprocess
@@ -40,10 +41,12 @@ def boat(time):
 
 def both(winch, rtol):
     """Return a run, and times and states of the ends of a tether that does the same, with the tether."""
-    rest = cable.hold([FIRST, SECOND], 34.0, CURRENT, cable=HEAVY, segment_length=0.5)
-    drum = cable.MovingDrum(velocity=boat, drum=winch)
-    run = cable.pull_out(swing, SECONDS, drum=drum, start=rest, scheme=cable.MovingEnd(rtol=rtol))
     first, second = sample_path(swing, SECONDS, 0.1), sample_path(boat, SECONDS, 0.1)
+    mean = np.mean([first.leaving[0], second.leaving[0]], axis=0)
+    passing = dataclasses.replace(CURRENT, velocity=CURRENT.velocity - mean)
+    rest = cable.hold([FIRST, SECOND], 34.0, passing, cable=HEAVY, segment_length=0.5)
+    drum, scheme = cable.MovingDrum(velocity=boat, drum=winch), cable.MovingEnd(rtol=rtol)
+    run = cable.pull_out(swing, SECONDS, drum=drum, start=rest, current=CURRENT, scheme=scheme)
     ends = np.stack(
         [
             np.stack([FIRST + first.place, first.leaving], axis=1),
