@@ -44,18 +44,17 @@ from cable.moving_end.host_step import (
     attempt,
     begin,
     handle_of,
+    in_one_piece,
+    laid,
     make_real,
-    packed,
 )
-from cable.moving_end.initial_shape import lay_held, lay_straight, set_steady_tow, steady_direction
-from cable.moving_end.segment_load import new_load
+from cable.moving_end.initial_shape import lay_held, straight_between, towed_from
 from cable.moving_end.state import NOW, Line, enlarged, new_line
-from cable.moving_end.stops import Names, describe_stop
-from cable.moving_end.time_loop import new_record
+from cable.moving_end.stops import Names, describe_bad_number, describe_jump, describe_reach, describe_stop
 from cable.properties import CableProperties
 from cable.schemes import COARSEST, FINEST, SHORTEST_S, TOLERANCE
 from cable.task import START_LENGTH, Drum, current_of
-from cable.tow_path import TowPath, first_direction, segments_needed
+from cable.tow_path import segments_needed
 from cable.winch import SHORTEST, Brake, ConstantTension, PayOutRate
 from subzero.arguments import checked_arguments
 from subzero.errors import BadValueError, UserError, checked, short, whole
@@ -148,6 +147,7 @@ class Tether:
         Raises:
             subzero.UserError: ends, a length or segments that make no sense, or no cable at rest between the ends.
         """
+        self._tried: tuple[float, np.ndarray, Drum, np.ndarray] | None = None
         self.cable = CableProperties() if cable is None else cable
         self.current, self._owner = current_of(current), uuid4().hex
         states = _checked_ends("Tether", ends, None)
@@ -170,13 +170,15 @@ class Tether:
             tail_drag = (
                 0.5 * self.cable.water_density * checked("", "drogue_drag_area", drogue_drag_area, least=0.0)
             )
-            line, origin = _towed(self.cable, states[0], start, each, self.current, tail_drag)
+            J = self.current.at(states[0, 0])
+            line, origin = towed_from(self.cable, states[0], start, each, J, tail_drag)
         elif abs(start - way) <= STRAIGHT * start or way <= START_LENGTH >= start:
-            line, origin = _straight(self.cable, states, start, each, drum), states[1, 0]
+            line, origin = straight_between(states, start, each, drum, self.cable.numbers()), states[1, 0]
         else:
             line, origin = _at_rest(self.cable, states, start, each, self.current, drum), states[1, 0]
         line.ends.solver.tolerance = checked("Tether", "tolerance", tolerance, least=FINEST, most=COARSEST)
-        self._take(_laid(line, states, origin, drum, start, self.cable, self.current))
+        water = self.current.numbers(origin)
+        self._take(laid(line, states, origin, drum, start, self.cable.numbers(), water))
         if self._rtol > 0.0:
             self._line.ends.tow.largest = atol / self._rtol  # errors are shares of it
         begin(self._held)
@@ -195,7 +197,8 @@ class Tether:
     @property
     def shape(self) -> np.ndarray:
         """Places of the nodes, the first end first, earth axes (nodes, 3). [m]."""
-        return self._line.position[NOW, : int(self._line.ends.count) + 1] + self._stepped.origin
+        shape: np.ndarray = self._line.position[NOW, : int(self._line.ends.count) + 1] + self._stepped.origin
+        return shape
 
     @property
     def tension(self) -> np.ndarray:
@@ -291,8 +294,8 @@ class Tether:
         """Return ∂F/∂x (3 ends, 3 ends): how the forces after a step of dt answer to the places of the ends there.
 
         Rows and columns: north, east, down of the first end, then of the second. The velocities move along, by
-        3/(2 dt) per metre behind a step of dt (`moving_end.bdf2`): so ∂F/∂v = (2 dt/3) ∂F/∂x. A long dt gives the static
-        stiffness, a short one the inertia. Central differences of solved steps; the state does not change. [N/m]
+        3/(2 dt) per metre behind a step of dt (`moving_end.bdf2`): so ∂F/∂v = (2 dt/3) ∂F/∂x. A long dt gives the
+        static stiffness, a short one the inertia. Central differences of solved steps; the state does not change. [N/m]
 
         Raises:
             TetherError: no solution next to this state, as for a taut cable that cannot stretch.
@@ -356,11 +359,11 @@ class Tether:
         )
 
     def _take(self, stepped: Stepped) -> None:
-        """Keep the arrays, and what is read of them after every step."""
+        """Keep the arrays, and the forces in them."""
         self._stepped, self._line = stepped, stepped.line
         self._held = handle_of(stepped)
         self._on_first, self._on_second = stepped.line.ends.tow.force, stepped.line.ends.drum_force
-        self._tried: tuple[float, np.ndarray, Drum, np.ndarray] | None = None
+        self._tried = None
 
     def _enlarge(self, capacity: int) -> None:
         """Give the cable space for `capacity` segments; its numbers are those of before where they fit."""
@@ -368,7 +371,7 @@ class Tether:
         line, old = self._line, self._stepped
         fits = capacity >= line.length.size - 1
         line = enlarged(line, capacity) if fits else new_line(capacity)._replace(ends=line.ends)
-        self._take(_in_one_piece(old._replace(line=line)))
+        self._take(in_one_piece(old._replace(line=line)))
 
     def _forget_attempt(self) -> None:
         """Take an attempt back that was not accepted."""
@@ -417,8 +420,8 @@ class Tether:
         if asked[1] > self._longest:
             raise TetherError(
                 f"At t = {now:g} s the winch is to pay out to {asked[1]:.6g} m within {dt:g} s; drum and water hold "
-                f"{self._longest:.6g} m together (longest). Brake, or pay out {(self._longest - start) / dt:.4g} m/s at "
-                "most."
+                f"{self._longest:.6g} m together (longest). Brake, or pay out {(self._longest - start) / dt:.4g} "
+                "m/s at most."
             )
         if asked[1] <= SHORTEST:
             raise TetherError(
@@ -446,26 +449,11 @@ class Tether:
         """Return why a step ended so, and take back what it did; `most` is the cable that there can be [m]."""
         now = self.time
         if ending == NO_NUMBER:
-            end, row = next(
-                (end, row)
-                for end in range(self._ends)
-                for row in range(2)
-                if not np.isfinite(states[end, row]).all()
-            )
-            what = ("place", "velocity")[row]
-            return (
-                f"At t = {now:g} s the host gave ends[{end}] the {what} {short(states[end, row].tolist())}: three finite "
-                "numbers are needed, north, east, down. Look for what made it no number in the host, one step earlier."
-            )
+            return describe_bad_number(now, states)
         if ending == JUMPED:
-            return _jumped(now, dt, self._places(), states)
-        way = float(np.linalg.norm(states[0, 0] - states[-1, 0]))
+            return describe_jump(now, dt, self._places(), states)
         if ending == TOO_FAR:
-            can = "be pulled to twice that" if self.cable.compliance > 0.0 else "not stretch"
-            return (
-                f"At t = {now:g} s the ends are to be {way:.6g} m apart, and there are {most:.6g} m of cable, which can "
-                f"{can}. Pay out, hold the ends back, or give the cable a compliance."
-            )
+            return describe_reach(now, states, most, self._stepped.cable)
         if ending == EMPTY:
             words = (
                 f"Within {dt:g} s after t = {now:g} s more cable is pulled off than drum and water hold together, "
@@ -503,8 +491,8 @@ def _checked_ends(owner: str, ends: Ends, count: int | None) -> np.ndarray:
             return states
     many = "one or two" if count is None else str(count)
     raise TetherError(
-        f"{owner}: ends is {short(ends)}; it must be the finite places of {many} ends, north, east, down in m, each alone"
-        " or with its velocity in m/s: [(place, velocity), …]."
+        f"{owner}: ends is {short(ends)}; it must be the finite places of {many} ends, north, east, down in m, each "
+        "alone or with its velocity in m/s: [(place, velocity), …]."
     )
 
 
@@ -537,92 +525,3 @@ def _at_rest(
     lay_held(line, rest, states[0, 1], states[1, 1], 0.0)
     line.ends.drum_force[:] = -rest.drum_force
     return line
-
-
-def _straight(
-    cable: CableProperties, states: np.ndarray, length: float, each: float, drum: DrumNumbers
-) -> Line:
-    """Return a straight line between the ends; one of no length lies along the way of its first end."""
-    apart, drum.velocity[:] = states[0, 0] - states[1, 0], states[1, 1]
-    direction = first_direction(np.array([apart, states[0, 1] - states[1, 1]]))
-    line = new_line(segments_needed(length, each, 0.0) + SPARE)
-    line.ends.layout.segment_length = each
-    lay_straight(line, length, direction, states[0, 1], drum, cable.numbers())
-    line.ends.drum_force[:] = -direction * float(line.node_tension[line.ends.count])
-    return line
-
-
-def _towed(
-    cable: CableProperties, state: np.ndarray, length: float, each: float, current: Current, tail_drag: float
-) -> tuple[Line, np.ndarray]:
-    """Return a line that is towed steadily, and the place from which its places are counted: that of its tail."""
-    count = max(1, int(np.ceil(length / each - 1e-9)))
-    line, J = new_line(count), current.at(state[0])
-    line.ends.layout.segment_length = length / count
-    uphill = steady_direction(state[1:], J, cable, tail_drag)
-    lay_straight(line, length, uphill, state[1], DrumProperties().numbers(), cable.numbers())
-    line.ends.layout.free_end, line.ends.layout.tail_drag = True, tail_drag
-    set_steady_tow(line, state[1], J, cable, tail_drag)
-    return line, state[0] - line.position[NOW, 0]
-
-
-def _laid(
-    line: Line,
-    states: np.ndarray,
-    origin: np.ndarray,
-    drum: DrumNumbers,
-    length: float,
-    cable: CableProperties,
-    current: Current,
-) -> Stepped:
-    """Return what a tether's step takes, for a line that is laid out."""
-    path = TowPath(*(np.zeros(shape) for shape in (2, (2, 3), (2, 3), (2, 3))))
-    path.place[:], path.leaving[:], path.arriving[:] = states[0, 0] - origin, states[0, 1], states[0, 1]
-    away = states[1:] if len(states) > 1 else np.zeros((1, 2, 3)) + [[origin], [np.zeros(3)]]
-    rows = [np.concatenate([[0.0], away[0, 0] - origin, away[0, 1], [length]])] * 2
-    stepped = Stepped(
-        line=line,
-        path=path,
-        led=np.array(rows),
-        record=new_record(2, 1),
-        drum=drum,
-        now=np.zeros(2),
-        memory=np.zeros(0),
-        kept=np.zeros(0),
-        water=current.numbers(origin),
-        cable=cable.numbers(),
-        work=new_load(),
-        origin=np.array(origin),
-    )
-    return _in_one_piece(stepped)
-
-
-def _in_one_piece(stepped: Stepped) -> Stepped:
-    """Return the same with all that changes in one piece of memory."""
-    line, path, record = stepped.line, stepped.path, stepped.record
-    kept = ("steps", "ledger", "impulse")
-    parts = [*line, *path, *(getattr(record, name) for name in kept), stepped.led, stepped.drum, stepped.now]
-    memory, views = packed(parts)
-    lines, ways = len(line), len(line) + len(path)
-    return stepped._replace(
-        line=Line(*views[:lines]),
-        path=TowPath(*views[lines:ways]),
-        record=record._replace(**dict(zip(kept, views[ways:], strict=False))),
-        led=views[-3],
-        drum=views[-2],
-        now=views[-1],
-        memory=memory,
-        kept=memory.copy(),
-    )
-
-
-def _jumped(now: float, dt: float, here: np.ndarray, states: np.ndarray) -> str:
-    """Return which end jumps, and how far."""
-    miss = states[:, 0] - here[:, 0] - 0.5 * dt * (here[:, 1] + states[:, 1])
-    end = int(np.argmax(np.linalg.norm(miss, axis=1)))
-    return (
-        f"At t = {now:g} s ends[{end}] is to move {np.linalg.norm(states[end, 0] - here[end, 0]):.4g} m within {dt:g} s, "
-        f"at {np.linalg.norm(here[end, 1]):.4g} m/s before and {np.linalg.norm(states[end, 1]):.4g} m/s after: it jumps. "
-        "Give the velocity that belongs to the motion, take shorter steps, or make another tether where the host was "
-        "put elsewhere."
-    )

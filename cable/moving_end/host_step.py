@@ -25,9 +25,9 @@ from cable.drum_motion import PLACE, SETPOINT, VELOCITY
 from cable.moving_end.energy import book_step, energy_flow
 from cable.moving_end.initial_shape import start_in_water
 from cable.moving_end.remeshing import accept
-from cable.moving_end.segment_load import Load
+from cable.moving_end.segment_load import Load, new_load
 from cable.moving_end.state import NEW, Line
-from cable.moving_end.time_loop import FIRST_STEP, Record, cover, note_force
+from cable.moving_end.time_loop import FIRST_STEP, Record, cover, new_record, note_force
 from cable.moving_end.time_step import try_step
 from cable.properties import CableNumbers
 from cable.tow_path import TowPath
@@ -87,7 +87,7 @@ class _HandleType(types.StructRef):
 
 
 class _Reference(structref.StructRefProxy):
-    """A tether as one pointer, in place of some forty arrays that each call would unpack; `Stepped` keeps them alive."""
+    """A tether as one pointer, not forty arrays that each call would unpack; `Stepped` keeps them alive."""
 
 
 structref.define_boxing(_HandleType, _Reference)
@@ -273,3 +273,53 @@ def packed(parts: Sequence[Any]) -> tuple[np.ndarray, list[Any]]:
         views.append(view[0] if isinstance(part, Numbers) else view)
         first += size
     return memory, views
+
+
+def laid(
+    line: Line,
+    states: np.ndarray,
+    origin: np.ndarray,
+    drum: DrumNumbers,
+    length: float,
+    cable: CableNumbers,
+    water: Water,
+) -> Stepped:
+    """Return what a tether's step takes, for a line that is laid out."""
+    path = TowPath(*(np.zeros(shape) for shape in (2, (2, 3), (2, 3), (2, 3))))
+    path.place[:], path.leaving[:], path.arriving[:] = states[0, 0] - origin, states[0, 1], states[0, 1]
+    away, velocity = (states[1, 0] - origin, states[1, 1]) if len(states) > 1 else (np.zeros(3), np.zeros(3))
+    rows = [[0.0, *away, *velocity, length]] * 2
+    stepped = Stepped(
+        line=line,
+        path=path,
+        led=np.array(rows),
+        record=new_record(2, 1),
+        drum=drum,
+        now=np.zeros(2),
+        memory=np.zeros(0),
+        kept=np.zeros(0),
+        water=water,
+        cable=cable,
+        work=new_load(),
+        origin=np.array(origin),
+    )
+    return in_one_piece(stepped)
+
+
+def in_one_piece(stepped: Stepped) -> Stepped:
+    """Return the same with all that changes in one piece of memory."""
+    line, path, record = stepped.line, stepped.path, stepped.record
+    kept = ("steps", "ledger", "impulse")
+    parts = [*line, *path, *(getattr(record, name) for name in kept), stepped.led, stepped.drum, stepped.now]
+    memory, views = packed(parts)
+    lines, ways = len(line), len(line) + len(path)
+    return stepped._replace(
+        line=Line(*views[:lines]),
+        path=TowPath(*views[lines:ways]),
+        record=record._replace(**dict(zip(kept, views[ways:], strict=False))),
+        led=views[-3],
+        drum=views[-2],
+        now=views[-1],
+        memory=memory,
+        kept=memory.copy(),
+    )

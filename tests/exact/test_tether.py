@@ -13,7 +13,7 @@ REST = np.zeros(3)
 
 
 def test_a_tether_that_was_moved_comes_to_rest_as_a_catenary():
-    """30 m of heavy cable between ends 24 m apart, after one was carried there: T = w (a + height above the lowest point).
+    """30 m of heavy cable between ends 24 m apart, after one was carried there: T = w (a + height).
 
     Tolerance: 50 segments are a polygon with errors of (1/50)², 4e-4; drag grows
     with the square of the speed and lets the last motion decay slowly, so it rests for 300 s.

@@ -119,7 +119,7 @@ def test_a_moving_host_gains_nothing():
 
 
 def test_a_cycle_of_the_host_puts_work_in_and_never_gets_any_out():
-    """Work of the host over whole cycles is what drag takes: −∮F·v dt > 0; and the tether's own balance of energy closes.
+    """Work of the host over whole cycles is what drag takes, −∮F·v dt > 0; the tether's balance of energy closes.
 
     Tolerance: the balance to 2 % of work and loss, steps of second order and trapezoidal sums.
     """
@@ -131,9 +131,10 @@ def test_a_cycle_of_the_host_puts_work_in_and_never_gets_any_out():
         place, velocity = circle(time, rate=rate)
         return np.array([[np.array([18.0, 0.0, 8.0]) + place, velocity], [REST, REST]])
 
-    work = []
-    for k in range(1, round(3 * cycle / dt) + 1):
-        work.append(-dt * np.sum(tether.step(dt, at(k * dt))[0] * at(k * dt)[0, 1]))
+    work = [
+        -dt * np.sum(tether.step(dt, at(k * dt))[0] * at(k * dt)[0, 1])
+        for k in range(1, round(3 * cycle / dt) + 1)
+    ]
     thirds = np.add.reduceat(work, [0, len(work) // 3, 2 * len(work) // 3])
     assert (thirds[1:] > 0.0).all()
     assert thirds[2] == pytest.approx(thirds[1], rel=0.05)
@@ -161,9 +162,7 @@ def test_an_impulse_moves_the_cable_and_nothing_else():
         x += 0.5 * dt * (v + new)
         v = new
         along = np.array([v, 0.0, 0.0])
-        forces = tether.step(
-            dt, [((1.001 * length + x, 0.0, 0.0), along), ((x, 0.0, 0.0), along)]
-        )
+        forces = tether.step(dt, [((1.001 * length + x, 0.0, 0.0), along), ((x, 0.0, 0.0), along)])
         impulse -= dt * forces.sum(axis=0)[0]
     assert impulse == pytest.approx(ghost.mass_per_length * length * speed, rel=0.01)
 

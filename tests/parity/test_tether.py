@@ -55,7 +55,14 @@ def both(winch, rtol):
         axis=1,
     )
     tether = cable.Tether(
-        HEAVY, length=34.0, ends=ends[0], winch=winch, current=CURRENT, segment_length=0.5, rtol=rtol, atol=0.0
+        HEAVY,
+        length=34.0,
+        ends=ends[0],
+        winch=winch,
+        current=CURRENT,
+        segment_length=0.5,
+        rtol=rtol,
+        atol=0.0,
     )
     return run, first.times, ends, tether
 
@@ -96,7 +103,9 @@ def test_a_tether_with_one_end_is_the_cable_of_tow():
     for k in range(1, way.times.size):
         (force,) = tether.step(way.times[k] - way.times[k - 1], [(way.place[k], way.leaving[k])])
         assert np.array_equal(force, run.tow_force[k])
-    np.testing.assert_allclose(tether.shape - tether.shape[0], run.shapes[k] - run.shapes[k][0], rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(
+        tether.shape - tether.shape[0], run.shapes[k] - run.shapes[k][0], rtol=0.0, atol=1e-13
+    )
 
 
 def test_attempts_that_are_accepted_are_a_step():
