@@ -77,7 +77,7 @@ def show_states() -> None:
         tether.restore(tether.save())
     cost, grown = (time.process_time() - start) / CYCLES, process.memory_info().rss - before
     print(
-        f"\n{CYCLES} save and restore cycles at 100 segments: {1e6 * cost:.1f} µs each, {grown / 1024:.0f} kB more memory"
+        f"\n{CYCLES} cycles of save and restore, 100 segments: {1e6 * cost:.1f} µs each, {grown / 1024:.0f} kB more"
     )
 
 

@@ -17,8 +17,8 @@ cable.mass_per_length …                              parameter   as in `cable.
 length_at_start, segments, longest                   parameter   m, 1, m (0: no limit)
 current_north, current_east, current_down            parameter   m/s
 
-A host steps its vehicle first, sets places and velocities as they are at the end of the step, then steps the tether. The
-places that are set before initialisation ends are those of the start. States are got and set (reject and retry).
+A host steps its vehicle first, sets places and velocities as they are at the end of the step, then steps the tether.
+The places that are set before initialisation ends are those of the start. States are got and set (reject and retry).
 """
 
 from __future__ import annotations

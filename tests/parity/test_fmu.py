@@ -36,7 +36,8 @@ reference = {variable.name: variable.valueReference for variable in about.modelV
 outputs = [variable.name for variable in about.modelVariables if variable.causality == "output"]
 began = time.perf_counter()
 unit = fmi2.FMU2Slave(
-    guid=about.guid, unzipDirectory=extract(path), modelIdentifier=about.coSimulation.modelIdentifier, instanceName="one"
+    guid=about.guid, unzipDirectory=extract(path), instanceName="one",
+    modelIdentifier=about.coSimulation.modelIdentifier,
 )
 unit.instantiate()
 unit.setupExperiment(startTime=0.0)
