@@ -175,7 +175,8 @@ class Tether:
         elif abs(start - way) <= STRAIGHT * start or way <= START_LENGTH >= start:
             line, origin = straight_between(states, start, each, drum, self.cable.numbers()), states[1, 0]
         else:
-            line, origin = _at_rest(self.cable, states, start, each, self.current, drum), states[1, 0]
+            rate = _rate_at_start(self._winch)
+            line, origin = _at_rest(self.cable, states, start, each, self.current, drum, rate), states[1, 0]
         line.ends.solver.tolerance = checked("Tether", "tolerance", tolerance, least=FINEST, most=COARSEST)
         water = self.current.numbers(origin)
         self._take(laid(line, states, origin, drum, start, self.cable.numbers(), water))
@@ -507,6 +508,20 @@ def _segment_length(length: float, segments: int | None, segment_length: float |
     return each
 
 
+def _rate_at_start(winch: Drum) -> float:
+    """Return the rate at which a winch pays out when a tether begins. [m/s]."""
+    if not isinstance(winch, PayOutRate):
+        return 0.0
+    return checked("PayOutRate", "rate", winch.rate(0.0) if callable(winch.rate) else winch.rate, unit="m/s")
+
+
+def _towards(places: np.ndarray) -> np.ndarray:
+    """Return the direction from the second of two places to the first one; zeros where they meet (3,)."""
+    apart = places[0] - places[1]
+    direction: np.ndarray = apart / max(float(np.linalg.norm(apart)), 1e-12)
+    return direction
+
+
 def _at_rest(
     cable: CableProperties,
     states: np.ndarray,
@@ -514,14 +529,21 @@ def _at_rest(
     each: float,
     current: Current,
     drum: DrumNumbers,
+    rate: float,
 ) -> Line:
-    """Return a line that hangs or streams between its ends as if they went on at their mean velocity."""
-    moving = states[:, 1].mean(axis=0)
+    """Return a line that hangs or streams between its ends as if it went on at its mean velocity.
+
+    A winch that pays out from the start on at `rate` [m/s] feeds cable that moves along itself already.
+    """
+    first, second = states[:, 1]
+    fed = second + rate * _towards(states[:, 0])
+    moving = 0.5 * (first + fed)
     passing = replace(current, velocity=current.velocity - moving) if moving.any() else current
     rest = hold(states[:, 0], length, passing, cable=cable, segment_length=each)
     line = new_line(rest.segment_lengths.size + SPARE)
     line.ends.layout.segment_length = float(rest.segment_lengths[0])
     drum.velocity[:] = states[1, 1]
-    lay_held(line, rest, states[0, 1], states[1, 1], 0.0)
+    fed = second + rate * _towards(rest.shape[[-2, -1]])
+    lay_held(line, rest, first, fed, rate)
     line.ends.drum_force[:] = -rest.drum_force
     return line

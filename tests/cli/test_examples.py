@@ -73,7 +73,11 @@ def test_an_example_uses_public_names_only(name):
             assert {module.name for module in node.names} <= OTHERS | set(PUBLIC)
         elif isinstance(node, ast.ImportFrom):
             assert node.module in OTHERS | set(PUBLIC)
-            assert {module.name for module in node.names} <= {*PUBLIC.get(node.module, ()), "Path", "simulate_fmu"}
+            assert {module.name for module in node.names} <= {
+                *PUBLIC.get(node.module, ()),
+                "Path",
+                "simulate_fmu",
+            }
         elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in PUBLIC:
             assert node.attr in PUBLIC[node.value.id]
 
