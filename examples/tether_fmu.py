@@ -21,7 +21,9 @@ inputs["pay_out_rate"] = np.where(times > 15.0, 0.1, 0.0)
 
 start = {"first_north": 27.0, "first_down": 8.0}
 outputs = ["first_tension", "second_tension", "length"]
-run = simulate_fmu(path, stop_time=30.0, output_interval=0.1, start_values=start, input=inputs, output=outputs)
+run = simulate_fmu(
+    path, stop_time=30.0, output_interval=0.1, start_values=start, input=inputs, output=outputs
+)
 
 figure, (above, below) = plt.subplots(2, layout="constrained", sharex=True)
 above.plot(run["time"], run["first_tension"], label="first end")

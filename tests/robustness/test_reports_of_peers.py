@@ -248,7 +248,7 @@ def test_a_winch_stops_where_its_cable_ends():
 def test_two_drones_on_one_tether():
     """mrs_uav_system 14, gz-sim 1039: both ends move, only the pull matters. Mirrored motions give mirrored forces.
 
-    Tolerance: 1e-3 of the largest force: the two ends are discretised alike but for the order in which they are solved.
+    Tolerance: 2 % of the largest force: the first end takes its load a quarter into its segment, the second one half into it.
     """
     air = cable.CableProperties(
         water_density=1.2, mass_per_length=0.02, cross_section_area=2e-5, diameter=0.005, compliance=1e-4
