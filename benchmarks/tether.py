@@ -30,8 +30,9 @@ CURRENT = (0.1, 0.1, 0.0)
 
 
 def ends_at(time_s: float, rate: float = 0.785) -> np.ndarray:
-    """Return the states of both ends: a vehicle that swings and a boat that heaves."""
-    s, c = np.sin(rate * time_s), np.cos(rate * time_s)
+    """Return the states of both ends: a vehicle that swings and a boat that heaves, from rest on."""
+    phase, rate = (0.25 * rate * time_s**2, 0.5 * rate * time_s) if time_s < 2.0 else (rate * (time_s - 1.0), rate)
+    s, c = np.sin(phase), np.cos(phase)
     vehicle = (25.0 + 0.5 * s, 0.5 * (1.0 - c), 10.0), (0.5 * rate * c, 0.5 * rate * s, 0.0)
     boat = (0.0, 0.0, 0.3 * s), (0.0, 0.0, 0.3 * rate * c)
     return np.array([vehicle, boat])

@@ -35,6 +35,7 @@ from cable.moving_end.energy import LOSS, STORED
 from cable.moving_end.host_step import (
     EMPTY,
     FINE,
+    JUMP,
     JUMPED,
     NO_NUMBER,
     TIME,
@@ -72,6 +73,8 @@ STRAIGHT = 1e-9
 """A cable that is as long as the way between its ends, but for this share, is laid straight. [-]"""
 SPARE = 8
 """Segments that are allocated for a cable that grows, beyond those that the next step needs."""
+SUDDEN = 2.0
+"""An end whose places alone are given may take up so much speed within a step. [m/s]"""
 MOVED = 1e-6
 """Displacement of an end in `Tether.linearise`, as a share of the cable's length. [-]"""
 
@@ -395,12 +398,20 @@ class Tether:
         else:
             states = _checked_ends("Tether.step", ends, self._ends)
             if np.ndim(ends) == 2:
-                states[:, 1] = (states[:, 0] - self._places()[:, 0]) / dt
+                self._take_up_speed(dt, states)
         if self._ends == 1:
             return dt, states, self._winch, np.zeros(2)
         winch = self._winch if winch is None else winch
         asked = self._winch_asked(winch, dt)
         return dt, states, winch, asked
+
+    def _take_up_speed(self, dt: float, states: np.ndarray) -> None:
+        """Fill the velocities of ends whose places alone are given (ends, 2, 3)."""
+        here = self._places()
+        way, speed = states[:, 0] - here[:, 0], np.linalg.norm(here[:, 1], axis=1)
+        states[:, 1] = way / dt
+        if (np.linalg.norm(way - dt * here[:, 1], axis=1) > JUMP + dt * (speed + SUDDEN)).any():
+            raise TetherError(describe_jump(self.time, dt, here, states))
 
     def _winch_asked(self, winch: Drum, dt: float) -> np.ndarray:
         """Return the length [m] or the tension [N] that a winch is asked for before and after a step (2,)."""

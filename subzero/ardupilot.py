@@ -4,15 +4,17 @@
     $ sim_vehicle.py -v ArduSub -f vectored --model JSON:127.0.0.1        # in another shell
 
 ArduPilot sends its motor outputs over UDP (port 9002), binary; the answer is a line of JSON with time, gyro, specific
-force, position, attitude and velocity, north, east, down (ArduPilot, libraries/SITL/examples/JSON/readme.md). Frames are
-answered one by one: a repeated frame gets the same answer again, a count that starts anew starts the simulation anew.
+force, position, attitude and velocity, north, east, down (ArduPilot, libraries/SITL/examples/JSON/readme.md). Frames
+are answered one by one: a repeated frame gets the same answer again, a count that starts anew starts the simulation
+anew.
 
     (M_RB + M_A) ν' = thrusters − C(ν) ν − (D + D₂|ν|) ν + weight and buoyancy + tether        (Fossen, 2011, 6.1)
 
 The ROV is a BlueROV2: mass, added mass, damping and buoyancy of C.-J. Wu (Flinders University, 2018), six thrusters of
 40 N as ArduSub's frame "vectored" mixes them. Munk's moment is left out: that of a closed hull with this added mass
-would turn it over from 0.5 m/s on, and that of an open frame is not known. Its tether is a `cable.Tether` from the top of its stern to a drum on a
-boat; the winch pays out as far as the ROV asks by a constant, small tension, or holds a fixed length.
+would turn it over from 0.5 m/s on, and that of an open frame is not known. Its tether is a `cable.Tether` from the top
+of its stern to a drum on a boat; the winch pays out as far as the ROV asks by a constant, small tension, or holds a
+fixed length.
 """
 
 from __future__ import annotations

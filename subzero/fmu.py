@@ -88,7 +88,7 @@ class TetherSlave(Fmi2Slave):
             self.register_variable(Real(name, **kind, **access), nested=False)
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Any:
-        """Return the description, with the outputs among what is computed when initialisation ends."""
+        """Return the description, with the outputs among the unknowns that initialisation computes."""
         root = super().to_xml(model_options or {})
         structure = root.find("ModelStructure")
         unknowns = SubElement(structure, "InitialUnknowns")
@@ -188,7 +188,7 @@ def export_fmu(
     Args:
         path: of the file, which ends in ``.fmu``.
         length: unstretched, at the start. [m]
-        cable: the cable; Table 1 of the source when not given. Each of its numbers stays a parameter of the unit.
+        cable: the cable; Table 1 of the source when not given. Each of its numbers is a parameter of the unit.
         segments: how many.
         longest: all cable that there is, in the water and on the drum; without limit when not given. [m]
         current: velocity of the water north, east, down. [m/s]

@@ -1,10 +1,11 @@
 """A tether that a host steps is the cable of `cable.pull_out`, of `cable.tow` and of the coupled run, to the last bit.
 
 Verifies: `cable.Tether` against those three. Configuration: 34 m of heavy, elastic cable in a sheared current between
-an end that swings and a drum on a boat, with every winch; 20 m with a free tail; 1 s of fig6 on 10 m of cable. The host
-gives the places that the other run has, and takes its steps (rtol = 0). Tolerance: none, but for the adaptive steps:
-there velocities enter, which `cable.pull_out` samples a billionth of a step before and after each time. Winches start
-from rest: with one that turns already, a tether starts with cable that moves along itself, and `cable.pull_out` does not.
+an end that swings and a drum on a boat, with every winch; 20 m with a free tail; 1 s of fig6 on 10 m of cable. The
+host gives the places that the other run has, and takes its steps (rtol = 0). Tolerance: none, but for the adaptive
+steps: there velocities enter, which `cable.pull_out` samples a billionth of a step before and after each time. Winches
+start from rest: with one that turns already, a tether starts with cable that moves along itself, and `cable.pull_out`
+does not.
 """
 
 import dataclasses

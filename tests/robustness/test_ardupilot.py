@@ -1,7 +1,8 @@
 """ArduPilot's JSON back end: an exchange over loopback with a tethered ROV, packet by packet.
 
-Verifies: `subzero.ardupilot` against the protocol (ArduPilot, libraries/SITL/examples/JSON/readme.md), and signs. Configuration: packets as SITL packs them, `<HHI16H` and `<HHI32H`, 50 frames a second, with the pulses of
-ArduSub's frame "vectored": forward is 1 and 2 below, 3 and 4 above 1500 µs. Tolerance: signs and rests only.
+Verifies: `subzero.ardupilot` against the protocol (ArduPilot, libraries/SITL/examples/JSON/readme.md), and signs.
+Configuration: packets as SITL packs them, `<HHI16H` and `<HHI32H`, 50 frames a second, with the pulses of ArduSub's
+frame "vectored": forward is 1 and 2 below, 3 and 4 above 1500 µs. Tolerance: signs and rests only.
 """
 
 import json

@@ -1,7 +1,8 @@
 """Public reports of users of other codes, rebuilt with a tether: docs/tether_reports.md lists them with their links.
 
-Verifies: `cable.Tether` and `cable.hold` where others were reported to fail or to be unclear. Configuration: the numbers
-of the report where it prints them, else of its kind; what is done stands in each test. Tolerance: in each test.
+Verifies: `cable.Tether` and `cable.hold` where others were reported to fail or to be unclear. Configuration: the
+numbers of the report where it prints them, else of its kind; what is done stands in each test. Tolerance: in each
+test.
 """
 
 import re
@@ -89,7 +90,8 @@ def test_a_step_of_five_metres_of_pay_out_has_no_spike(seconds):
 
 @pytest.mark.parametrize("dt", [0.02, 0.1, 0.5])
 def test_a_winch_has_one_number_and_the_length_is_its_integral(dt):
-    """OpenFAST 2297 and 2393: length and rate had to be given both, and to agree; what a signal 10, 0 means was unclear.
+    """OpenFAST 2297 and 2393: length and rate had to be given both, and to agree; what a signal 10, 0 means was
+    unclear.
 
     Tolerance: rounding. A ramp of the rate from 0 to 0.4 m/s in 4 s pays out 0.8 m, whatever the steps.
     """
@@ -103,14 +105,14 @@ def test_a_winch_has_one_number_and_the_length_is_its_integral(dt):
 
 
 def test_a_small_model_has_no_nan():
-    """MoorDyn 169: a model at 1:70 ended in NaN at the start, with any time step. Here: 1.5 m of thin chain in a tank."""
+    """MoorDyn 169: a model at 1:70 ended in NaN at the start, with any time step. Here: 1.5 m of thin chain."""
     thin = cable.CableProperties(
         mass_per_length=0.07, cross_section_area=1e-5, diameter=0.0036, compliance=1.0 / 1.6e4
     )
     ends = np.array([(1.2, 0.0, 0.2), (0.0, 0.0, 0.7)])
     tether = cable.Tether(thin, length=1.5, ends=ends, segments=40)
     for k in range(1, 201):
-        x = ends + [[0.05 * np.sin(6.0 * 0.05 * k), 0.0, 0.0], [0.0, 0.0, 0.0]]
+        x = ends + np.array([[0.05 * np.sin(6.0 * 0.05 * k), 0.0, 0.0], [0.0, 0.0, 0.0]])
         assert np.isfinite(tether.step(0.05, x)).all()
 
 
@@ -221,10 +223,11 @@ def test_any_number_of_segments_starts_and_steps(segments):
 
 
 def test_a_winch_that_turns_from_the_start_on_starts_without_a_jolt():
-    """KiteModels 99: the reel-out speed at the start was not taken into account. Here the cable moves along from t = 0 on.
+    """KiteModels 99: the reel-out speed at the start was not taken into account. Here the cable moves along from t = 0
+    on.
 
-    The first end goes away at 0.5 m/s, as fast as the winch gives: no pull of the first second is larger than that after
-    3 s by more than a tenth.
+    The first end goes away at 0.5 m/s, as fast as the winch gives: no pull of the first second is larger than that
+    after 3 s by more than a tenth.
     """
     away = np.array([0.5, 0.0, 0.0])
     tether = cable.Tether(
@@ -248,7 +251,8 @@ def test_a_winch_stops_where_its_cable_ends():
 def test_two_drones_on_one_tether():
     """mrs_uav_system 14, gz-sim 1039: both ends move, only the pull matters. Mirrored motions give mirrored forces.
 
-    Tolerance: 2 % of the largest force: the first end takes its load a quarter into its segment, the second one half into it.
+    Tolerance: 2 % of the largest force: the first end takes its load a quarter into its segment, the second one half
+    into it.
     """
     air = cable.CableProperties(
         water_density=1.2, mass_per_length=0.02, cross_section_area=2e-5, diameter=0.005, compliance=1e-4
@@ -268,8 +272,8 @@ def test_two_drones_on_one_tether():
 
 
 def test_the_other_end_rides_on_a_rover():
-    """ArduPilot 28749: "also make the tether on the ground movable". Both ends move on alike in still water and air-thin
-    water: the force stays that at rest. Tolerance: 1 % for the drag of such thin water.
+    """ArduPilot 28749: "also make the tether on the ground movable". Both ends drive on alike, in still
+    air: the force stays that at rest. Tolerance: 5 % for the drag of the air.
     """
     air = cable.CableProperties(
         water_density=1.2, mass_per_length=0.02, cross_section_area=2e-5, diameter=0.005, compliance=1e-4
@@ -311,7 +315,8 @@ def test_a_slung_payload_swings_like_a_pendulum():
 
 
 def test_a_hundred_segments_at_a_tenth_of_a_second_stay_stable():
-    """mbari_wec_gz 14: a chain of links "is tough on the physics engine, hurting performance and causing instabilities".
+    """mbari_wec_gz 14: a chain of links "is tough on the physics engine, hurting performance and causing
+    instabilities".
 
     Steps of 0.1 s, ends that heave by 1 m; the energy balance closes to 5 % and no force exceeds EA times the strain
     that the ends can cause.

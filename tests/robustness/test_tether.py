@@ -53,6 +53,8 @@ NAN = float("nan")
 REFUSED = {
     "an end jumps": (0.1, moved(0, [[10.0, 0, 0], [0, 0, 0]]), None, ["ends[0]", "10", "jumps", "t = 0.5"]),
     "the other end jumps": (0.1, moved(1, [[0, 0, 10.0], [0, 0, 0]]), None, ["ends[1]", "10 m", "jumps"]),
+    "a place alone jumps": (0.1, moved(0, [[10.0, 0, 0], [0, 0, 0]])[:, 0], None, ["ends[0]", "10", "jumps"]),
+    "a place alone jumps in a long step": (0.5, moved(0, [[0, 10.0, 0], [0, 0, 0]])[:, 0], None, ["ends[0]", "jumps"]),
     "a place is no number": (0.1, moved(0, [[NAN, 0, 0], [0, 0, 0]]), None, ["ends[0]", "place", "nan"]),
     "a velocity is no number": (0.1, moved(1, [[0, 0, 0], [NAN, 0, 0]]), None, ["ends[1]", "velocity", "nan"]),
     "a place is infinite": (0.1, moved(0, [[np.inf, 0, 0], [0, 0, 0]]), None, ["ends[0]", "inf"]),
