@@ -1,0 +1,353 @@
+"""`diagnose`: from records and a model to a verdict.
+
+    problem → search → nearness → locks → verdict
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from subzero.arguments import checked_arguments
+from subzero.identification.candidates import declared
+from subzero.identification.explanation import Entry, Term, Terms, with_term, without
+from subzero.identification.fit import Fit, free_fit
+from subzero.identification.locks import Locks, locks
+from subzero.identification.model import Model
+from subzero.identification.nearness import Nearness, nearness, rms
+from subzero.identification.problem import Problem, Progress
+from subzero.identification.record import Record
+from subzero.identification.search import Search
+from subzero.identification.verdict import (
+    CALIBRATED,
+    CAUSE_NAMED,
+    DATA_ERROR,
+    NOTHING_NEAR,
+    NOTHING_WRONG,
+    UNDECIDED,
+    Curves,
+    Estimate,
+    Named,
+    Share,
+    Verdict,
+    curves_of,
+)
+
+NAMED_PROBABILITY = 0.9
+"""A term is named from this probability on, over all explanations."""
+SEEN_ODDS = 9.0
+"""Odds from which on a term would be seen: of NAMED_PROBABILITY."""
+RELATED = 3.0
+"""Channels differ if all explanations say so, by so many standard deviations."""
+
+
+@checked_arguments
+def diagnose(
+    records: Record | Sequence[Record],
+    model: Model,
+    *,
+    held_out: Record | Sequence[Record] = (),
+    progress: Progress | None = None,
+) -> Verdict:
+    """Say what a model gets wrong in records, and whether it is near them at all.
+
+        >>> verdict = diagnose(read("est.csv", time="4 s", level="yEst", pump="uEst"), tanks)   # doctest: +SKIP
+        >>> print(verdict)                                                                     # doctest: +SKIP
+
+    Args:
+        records: one or several, which share all numbers of the model but the states at their beginnings.
+        model: what is known.
+        held_out: records that no fit sees, for the gain of what is named. Without them each of several records is
+            predicted by a fit of the others, or the last part of a single one by a fit of the first.
+        progress: called with the share that is done, and what is being done.
+
+    Raises:
+        UserError: a record cannot be used.
+        ModelError: the model cannot be used.
+    """
+    tell = progress or (lambda share, words: None)
+    given = [records] if isinstance(records, Record) else list(records)
+    kept = [held_out] if isinstance(held_out, Record) else list(held_out)
+    with threadpool_limits(limits=1, user_api="blas"):  # matrices are small
+        problem = Problem(model, given)
+        search = Search(problem, tell)
+        search.run()
+        tell(0.9, "locks")
+        return _concluded(search, kept)
+
+
+def _concluded(search: Search, held_out: Sequence[Record]) -> Verdict:
+    problem, ranked = search.problem, search.ranked()
+    best, probabilities = ranked[0], _probabilities(search, ranked)
+    free = free_fit(problem, best.terms, best.values)
+    near = nearness(problem, best, free)
+    marginal = _marginal(ranked, probabilities)
+    own = locks(problem, best, held_out) if near.near else {}
+    terms = [
+        _named(problem, best, term, marginal[term.id], own.get(term.id), near)
+        for term in best.terms
+        if term.kind != "tolerances"
+    ]
+    named = tuple(each for each in terms if near.near and not each.against and each.probability >= NAMED_PROBABILITY)
+    suspected = tuple(each for each in terms if each not in named)
+    budget = _budget(search, best)
+    return Verdict(
+        verdict=_kind(best, near, named, suspected, probabilities),
+        nearness=near,
+        named=named,
+        suspected=suspected,
+        explanations=_shown(ranked, probabilities),
+        relations=tuple(_relations(problem, ranked, probabilities)),
+        budget=budget,
+        remainder=_remainder(problem, best, near),
+        visible_from=_visible_from(search),
+        notes=_notes(problem, search),
+        curves=tuple(_curves(problem, search, free)),
+        complete=search.complete,
+    )
+
+
+def _probabilities(search: Search, ranked: Sequence[Fit]) -> np.ndarray:
+    log = np.array([search.score(each) for each in ranked])
+    weights = np.exp(log - log.max())
+    return weights / weights.sum()
+
+
+def _marginal(ranked: Sequence[Fit], probabilities: np.ndarray) -> dict[str, float]:
+    """Return the probability of every term, over all explanations."""
+    found: dict[str, float] = {}
+    for each, p in zip(ranked, probabilities.tolist(), strict=True):
+        for term in each.terms:
+            found[term.id] = found.get(term.id, 0.0) + p
+    return found
+
+
+def _kind(
+    best: Fit, near: Nearness, named: Sequence[Named], suspected: Sequence[Named], probabilities: np.ndarray
+) -> str:
+    if not near.near:
+        return NOTHING_NEAR
+    if any(not each.is_data_error for each in named):
+        return CAUSE_NAMED
+    if named:
+        return DATA_ERROR
+    if suspected or probabilities[0] < NAMED_PROBABILITY:
+        return UNDECIDED
+    return CALIBRATED if best.terms else NOTHING_WRONG
+
+
+def _named(
+    problem: Problem, best: Fit, term: Term, probability: float, lock: Locks | None, near: Nearness
+) -> Named:
+    against = lock.reasons if lock else ("the model is not near",) if not near.near else ()
+    gain = lock.gain if lock else None
+    return Named(term.id, term.sentence, term.is_data_error, probability, _estimates(problem, best, term), gain, against)
+
+
+def _estimates(problem: Problem, best: Fit, term: Term) -> tuple[Estimate, ...]:
+    """Return the numbers of a term, with those of y = a + b x as they are in the record."""
+    cause = next((cause for cause in problem.model.causes if cause.id == term.target), None)
+    changed = tuple(cause.changes) if cause else ()
+    found = []
+    for entry, value, variance in zip(best.entries, best.x.tolist(), best.variance.tolist(), strict=True):
+        own = entry.name.partition(".")[0] == term.target and entry.kind in ("cause", "change", "since")
+        if own or (term.kind == "cause" and entry.kind == "number" and entry.name in changed):
+            name = f"{entry.name}.since" if entry.kind == "since" else entry.name
+            off = cause.off.get(entry.name.partition(".")[2], entry.centre) if cause else entry.centre
+            found.append(Estimate(name, value, math.sqrt(variance), off))
+        elif term.is_data_error and entry.name == term.target:
+            found += _of_data_error(term, entry, value, math.sqrt(variance))
+    if term.kind == "unit":
+        found = [Estimate("factor", term.factor, 0.0, 1.0), Estimate("offset", term.offset, 0.0, 0.0)]
+    return tuple(found)
+
+
+def _of_data_error(term: Term, entry: Entry, value: float, sd: float) -> list[Estimate]:
+    if entry.kind == "gain" and term.slot[0] == "y = a + b x":
+        return [Estimate("factor", term.factor * (1.0 + value), abs(term.factor) * sd, 1.0)]
+    if entry.kind == "offset" and term.slot[0] == "y = a + b x":
+        return [Estimate("offset", term.offset + term.factor * value, abs(term.factor) * sd, 0.0)]
+    return [Estimate(entry.kind, value, sd, 0.0)] if entry.kind == term.kind else []
+
+
+def _shown(ranked: Sequence[Fit], probabilities: np.ndarray) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for each, p in zip(ranked, probabilities.tolist(), strict=True):
+        name = " + ".join(_name(term) for term in each.terms) or "nothing is wrong"
+        found[name] = found.get(name, 0.0) + p
+    return found
+
+
+def _name(term: Term) -> str:
+    return f"{term.id} ({term.sentence.partition(': ')[2]})" if term.kind == "unit" else term.id
+
+
+def _relations(problem: Problem, ranked: Sequence[Fit], probabilities: np.ndarray) -> list[str]:
+    """Return what explanations have in common about two channels of one unit, though not which of them is wrong."""
+    units = {name: problem.model.channels[name].unit for name in problem.channels}
+    names = list(problem.channels)
+    pairs = [(a, b) for i, a in enumerate(names) for b in names[i + 1 :] if units[a] == units[b]]
+    found = []
+    for a, b in pairs:
+        ratio = _contrast(ranked, probabilities, a, b, "gain")
+        clock = _contrast(ranked, probabilities, a, b, "delay")
+        said = []
+        if ratio is not None:
+            said.append(f"by a factor {math.exp(ratio[0]):.3f} ± {math.exp(ratio[0]) * ratio[1]:.2g} ({b} over {a})")
+        if clock is not None:
+            said.append(f"their clocks by {abs(clock[0]):.2f} ± {clock[1]:.2g} s ({b if clock[0] > 0 else a} is later)")
+        if said and not _decided(ranked, probabilities, (a, b)):
+            found.append(f"{a} and {b} differ {', and '.join(said)}. Which of them is wrong these records cannot tell.")
+    return found
+
+
+def _decided(ranked: Sequence[Fit], probabilities: np.ndarray, channels: tuple[str, str]) -> bool:
+    """Return whether one set of errors of two channels is probable enough to be named."""
+    sets: dict[tuple[str, ...], float] = {}
+    for each, p in zip(ranked, probabilities.tolist(), strict=True):
+        name = tuple(sorted(term.id for term in each.terms if term.target in channels))
+        sets[name] = sets.get(name, 0.0) + p
+    return max(sets.values()) >= NAMED_PROBABILITY
+
+
+def _contrast(
+    ranked: Sequence[Fit], probabilities: np.ndarray, a: str, b: str, kind: str
+) -> tuple[float, float] | None:
+    """Return log scale or delay of channel b less that of a, over all explanations, and its standard deviation; None
+    where it may be 0.
+    """
+    means, variances = [], []
+    for each in ranked:
+        mean = variance = 0.0
+        for channel, sign in ((b, 1.0), (a, -1.0)):
+            factor = [term.factor for term in each.terms if term.target == channel and term.slot[0] == "y = a + b x"]
+            mean += sign * sum(math.log(abs(f)) for f in factor) if kind == "gain" else 0.0
+            for entry, value, own in zip(each.entries, each.x.tolist(), each.variance.tolist(), strict=True):
+                if entry.kind == kind and entry.name == channel:
+                    mean += sign * (math.log1p(value) if kind == "gain" else value)
+                    variance += own / (1.0 + value) ** 2 if kind == "gain" else own
+        means.append(mean)
+        variances.append(variance)
+    mean = float(probabilities @ np.array(means))
+    sd = math.sqrt(float(probabilities @ (np.array(variances) + (np.array(means) - mean) ** 2)))
+    return (mean, sd) if sd > 0.0 and abs(mean) > RELATED * sd else None
+
+
+def _budget(search: Search, best: Fit) -> tuple[Share, ...]:
+    """Return what each term of the best explanation takes in free simulation, the largest share first."""
+    problem = search.problem
+    start = best.values
+
+    def left(terms: Terms) -> float:
+        e = free_fit(problem, terms, start).linear.e
+        return rms(np.concatenate([e[name][problem.used(name, terms)] / problem.levels[name] for name in e]))
+
+    shares: list[Share] = []
+    here: Terms = ()
+    before = left(here)
+    remaining = list(best.terms)
+    while remaining:
+        after, term = min(((left(with_term(here, each)), each) for each in remaining), key=lambda pair: pair[0])
+        shares.append(Share(term.id, before, after))
+        here, before = with_term(here, term), after
+        remaining.remove(term)
+    return tuple(shares)
+
+
+def _remainder(problem: Problem, best: Fit, near: Nearness) -> str:
+    """Return where what stays acts, and with what it grows."""
+    if near.near or not problem.model.unknown:
+        return ""
+    name = max(near.sizes, key=lambda each: near.sizes[each][0] / near.sizes[each][1])
+    rows = []
+    for k, record in enumerate(problem.records):
+        values = np.array(
+            [v for e, v in zip(best.entries, best.x.tolist(), strict=True) if e.identity[:3] == ("unknown", name, k)]
+        )
+        rows.append((record, np.abs(np.interp(record.time, problem.knots[k][name], values))))
+    size = np.concatenate([row for _, row in rows])
+    grows = [
+        (float(np.corrcoef(size, column)[0, 1]), other)
+        for other in (*problem.model.inputs, *problem.channels)
+        for column in [np.concatenate([_on_grid(record, other) for record, _ in rows])]
+        if np.std(column) > 0.0 and np.std(size) > 0.0
+    ]
+    strongest = max(grows, key=lambda pair: abs(pair[0]), default=(0.0, ""))
+    words = f", and {'grows' if strongest[0] > 0 else 'falls'} with {strongest[1]}" if abs(strongest[0]) > 0.5 else ""
+    return f"What stays acts on {name}{words}."
+
+
+def _on_grid(record: Record, name: str) -> np.ndarray:
+    values, time = record.columns[name], record.times_of(name)
+    known = np.isfinite(values)
+    return np.interp(record.time, time[known], values[known])
+
+
+def _visible_from(search: Search) -> dict[str, str]:
+    """Return error or cause → the size from which on it would be seen, beside "nothing is wrong".
+
+    The odds of a term with the prior N(0, s²) exceed SEEN_ODDS where x² ≥ 2 σ² (log(odds/prior odds) + log(s/σ)).
+    """
+    base = search.fits[()].linear
+    found: dict[str, str] = {}
+    for term in declared(search.problem):
+        if term.kind not in ("scale", "offset", "delay", "cause") or math.isfinite(term.begins) or term.size:
+            continue
+        for linear in search.added(base, term):
+            for name, size, unit in _sizes(search.problem, linear, term):
+                found.setdefault(name, f"{size:.2g}{unit}")
+    return found
+
+
+def _sizes(problem: Problem, linear: object, term: Term) -> list[tuple[str, float, str]]:
+    from subzero.identification.fit import Linear, spreads
+
+    assert isinstance(linear, Linear)
+    _, _, (factor, _) = linear.evidence(problem)
+    sd = spreads(linear.entries, linear.levels)
+    half = np.linalg.inv(np.tril(factor))
+    variance = sd**2 * np.sum(half**2, axis=0)
+    cause = next((cause for cause in problem.model.causes if cause.id == term.target), None)
+    found = []
+    for i, entry in enumerate(linear.entries):
+        mine = entry.name == term.target if term.is_data_error else bool(cause) and entry.name in (cause.changes if cause else ())
+        if not mine:
+            continue
+        data = 1.0 / max(1.0 / variance[i] - 1.0 / sd[i] ** 2, 1e-300)
+        log = math.log(SEEN_ODDS / term.odds) + 0.5 * math.log(max(sd[i] ** 2 / data, 1.0))
+        size = math.sqrt(2.0 * data * log)
+        unit = {"gain": " %", "delay": " s"}.get(entry.kind, "")
+        found.append((term.id, 100.0 * size if entry.kind == "gain" else size, unit))
+    return found
+
+
+def _notes(problem: Problem, search: Search) -> tuple[str, ...]:
+    found = []
+    for name, each in problem.channels.items():
+        spikes = int((np.isfinite(each.values) & ~each.used).sum())
+        if spikes:
+            found.append(f"{name}: {spikes} readings are set aside: outside the record's time, or alone far from both neighbours.")
+        if not each.prior.declared:
+            found.append(f"{name}: the noise of its sensor, {each.prior.level:.2g}, was read off the record.")
+    if not search.complete:
+        found.append("The search was ended after its largest number of fits; there may be better explanations.")
+    return tuple(found)
+
+
+def _curves(problem: Problem, search: Search, free: Fit) -> list[Curves]:
+    nothing = search.fits[()]
+    centre = np.array([entry.centre for entry in nothing.entries])
+    zero, _ = problem.residuals((), nothing.entries, [centre])
+    found = []
+    for name, each in problem.channels.items():
+        measured = problem.recorded(name, free.terms)
+        simulated = each.values - zero[name][:, 0]
+        for k, record in enumerate(problem.records):
+            at = (each.record == k) & problem.used(name, free.terms)
+            if at.any():
+                rows = (measured[at], measured[at] - simulated[at], free.linear.e[name][at])
+                found.append(curves_of(record, name, problem.model.channels[name].unit, each.time[at], rows))
+    return found

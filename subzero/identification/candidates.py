@@ -1,0 +1,162 @@
+"""Candidate terms, as the declarations and the residuals of a fit suggest them.
+
+Errors in the data are open: besides known factors and offsets, the regression of readings on a simulation is one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from subzero.identification.explanation import (
+    INPUTS,
+    INPUTS_LATE,
+    Term,
+    cause_terms,
+    data_terms,
+    from_time,
+    tolerance_term,
+    with_term,
+)
+from subzero.identification.fit import Linear
+from subzero.identification.problem import Problem, Readings
+
+FEWEST_STUCK = 10
+"""So many equal readings are looked at as a run."""
+STUCK_LEVELS = 5.0
+"""... while the simulation changes by so many levels of the sensor."""
+DELAYS_TRIED = 4
+"""Delays up to so many usual ones are tried, in steps of half of one."""
+FEWEST_AFTER = 8
+"""An error that begins in the middle of a record has so many readings before and after it."""
+CAPPED = 25.0
+"""Squared residual, in levels of the sensor, beyond which a reading says no more about when an error begins. [-]"""
+OFF_LEVELS = 3.0
+"""A channel that is closer to the simulation, in levels of its sensor (root mean square), has no gross error."""
+
+
+def declared(problem: Problem) -> list[Term]:
+    """Return the terms that a model declares, and those that its channels may have throughout."""
+    model = problem.model
+    duration = max(float(np.ptp(record.time)) for record in problem.records)
+    data = [term for term in data_terms(model) if term.target in (*problem.channels, INPUTS)]
+    return [*cause_terms(model, duration), tolerance_term(model), *data]
+
+
+def suggested(problem: Problem, linear: Linear, terms: list[Term]) -> list[Term]:
+    """Return which of some terms are worth a look at a point, and those that its residuals suggest."""
+    found = [term for term in terms if term.kind not in ("unit", "delay") or term.target == INPUTS]
+    for name in problem.channels:
+        if problem.model.channels[name].trusted:
+            continue
+        own = [term for term in terms if term.target == name and term.is_data_error]
+        found += _of_channel(problem, linear, name, own)
+    return found
+
+
+def _of_channel(problem: Problem, linear: Linear, name: str, own: list[Term]) -> Iterator[Term]:
+    """Yield errors of a channel: known ones that bring it closer, the regression, those from some time on, runs."""
+    each, used = problem.channels[name], problem.used(name, linear.terms)
+    e, level, turn = linear.e[name], problem.levels[name], problem.model.channels[name].turn
+    simulated = problem.recorded(name, linear.terms) - e
+    yield from _stuck(problem, name, simulated)
+    before = float(np.mean(e[used] ** 2))
+    yield from _delays(problem, linear, name, own)
+    if before < (OFF_LEVELS * level) ** 2:
+        return
+    known = [term for term in own if term.kind == "unit"]
+    for term in known:
+        now = _wrapped((each.values - term.offset) / term.factor - simulated, turn)
+        if float(np.mean(now[used] ** 2)) < before:
+            yield term
+    if (affine := _regression(problem, name, simulated, used)) is not None:
+        yield affine
+    soft = next((term for term in own if term.kind == "offset"), None)
+    for term in [*known, *([soft] if soft else [])]:
+        yield from _from_some_time(each, term, e, simulated, used, level, turn)
+
+
+def _delays(problem: Problem, linear: Linear, name: str, own: list[Term]) -> Iterator[Term]:
+    """Yield a delay of a channel, and of the inputs, that begin at the delay which leaves least of the channel."""
+    (term,) = [term for term in own if term.kind == "delay"]
+    terms = with_term(linear.terms, term)
+    entries = problem.entries(terms)
+    (place,) = [i for i, entry in enumerate(entries) if entry.kind == "delay" and entry.name == name]
+    known = {entry.identity: value for entry, value in zip(linear.entries, linear.x.tolist(), strict=True)}
+    x = np.array([known.get(entry.identity, entry.centre) for entry in entries])
+    sizes = np.linspace(-DELAYS_TRIED, DELAYS_TRIED, 4 * DELAYS_TRIED + 1)
+    sets = [np.where(np.arange(x.size) == place, size * entries[place].sd, x) for size in sizes]
+    found, _ = problem.residuals(terms, entries, sets)
+    used = problem.used(name, terms)
+    size = float(sizes[np.argmin(np.mean(found[name][used] ** 2, axis=0))])
+    yield replace(term, size=size)
+    if problem.model.inputs:
+        yield replace(term, id=f"delay:{INPUTS}", sentence=INPUTS_LATE, target=INPUTS, size=size)
+
+
+def _wrapped(values: np.ndarray, turn: float) -> np.ndarray:
+    return values - turn * np.rint(values / turn) if turn else values
+
+
+def _regression(problem: Problem, name: str, simulated: np.ndarray, used: np.ndarray) -> Term | None:
+    """Return y = a + b x of a channel by least squares, if the readings follow the simulation at all."""
+    h, y = simulated[used], problem.channels[name].values[used]
+    spread = float(np.std(h))
+    if spread <= problem.levels[name] or problem.model.channels[name].angle:
+        return None
+    b = float(np.mean((h - h.mean()) * (y - y.mean()))) / spread**2
+    if abs(b) < 1e-3 or b**2 * spread**2 < 0.5 * float(np.var(y)):
+        return None
+    a = float(np.mean(y - b * h))
+    odds = 0.1 * data_odds(problem)
+    return Term(f"affine:{name}", f"{name} has another scale and zero", "affine", name, odds, factor=b, offset=a)
+
+
+def data_odds(problem: Problem) -> float:
+    """Return the prior odds of the errors of one channel together."""
+    return sum(term.odds for term in data_terms(problem.model)) / max(len(problem.model.channels), 1)
+
+
+def _from_some_time(
+    each: Readings, term: Term, e: np.ndarray, simulated: np.ndarray, used: np.ndarray, level: float, turn: float
+) -> Iterator[Term]:
+    """Yield an error from the time on that fits best in each record, if there is one."""
+    for record in np.unique(each.record).tolist():
+        at = np.flatnonzero(used & (each.record == record))
+        if at.size < 2 * FEWEST_AFTER:
+            continue
+        here = term if term.kind == "unit" else replace(term, offset=_median_at_end(e[at]))
+        now = _wrapped((each.values[at] - here.offset) / here.factor - simulated[at], turn)
+        gain = np.minimum((e[at] / level) ** 2, CAPPED) - np.minimum((now / level) ** 2, CAPPED)
+        total = np.cumsum(gain[::-1])[::-1]
+        best = int(np.argmax(total))
+        if FEWEST_AFTER <= best <= at.size - FEWEST_AFTER and total[best] > CAPPED:
+            kept = here if term.kind == "unit" else replace(term, offset=0.0)
+            yield from_time(kept, record, float(each.time[at[best]]), 1.0 / at.size)
+
+
+def _median_at_end(e: np.ndarray) -> float:
+    """Return the median of the last quarter of residuals."""
+    return float(np.median(e[-max(e.size // 4, 1) :]))
+
+
+def _stuck(problem: Problem, name: str, simulated: np.ndarray) -> Iterator[Term]:
+    """Yield the longest run of equal readings in each record, while the simulation moves."""
+    each, sensor = problem.channels[name], problem.model.channels[name]
+    for record in np.unique(each.record).tolist():
+        at = np.flatnonzero(each.used & (each.record == record))
+        values = each.values[at]
+        ends = np.flatnonzero(np.diff(values, append=np.nan) != 0.0)
+        starts = np.concatenate([[0], ends[:-1] + 1])
+        k = int(np.argmax(ends - starts))
+        first, last = int(starts[k]), int(ends[k])
+        saturated = values[first] <= sensor.low or values[first] >= sensor.high
+        moved = np.ptp(simulated[at[first : last + 1]]) if last > first else 0.0
+        if last - first < FEWEST_STUCK or saturated or moved < STUCK_LEVELS * problem.levels[name]:
+            continue
+        start, end = float(each.time[at[first]]), float(each.time[at[last]])
+        sentence = f"{name} is stuck from {start:.4g} to {end:.4g} s"
+        odds = data_odds(problem) / at.size
+        yield Term(f"stuck:{name}@{record}", sentence, "stuck", name, odds, begins=start, ends=end, record=record)

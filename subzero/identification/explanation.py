@@ -1,0 +1,293 @@
+"""An explanation is a set of terms: each brings free numbers with a prior, changes the record or a prior, and has a
+sentence.
+
+    cause                numbers of an effect that is off by default, or a parameter that moves beyond its tolerance
+    cause from a time    the same, with the time as a free number
+    tolerances           every parameter may move four times as far as its tolerance: a calibration, no cause
+    data error           y = a + b x of a channel, with free a and b or at known values, throughout or from a time on
+    drift, delay         of a channel: a line in time; another clock
+    stuck                a run of equal readings says nothing
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from subzero.identification.model import Cause, Model
+
+INPUTS = "inputs"
+"""Target of an error of the clock of a record's inputs."""
+INPUTS_LATE = "the inputs are late or early"
+"""What it says."""
+WIDER = 4.0
+"""How much wider the tolerances of a calibration are. [-]"""
+TUNED_WIDER = 10.0
+"""How much farther a parameter may be off that was tuned through a channel which is not trusted: it is no independent
+evidence on that channel. [-]"""
+GAIN_SCALE = 0.1
+"""Usual error of the scale of a sensor (one standard deviation). [-]"""
+OFFSET_LEVELS, DELAY_INTERVALS = 30.0, 5.0
+"""Usual error of an offset or a drift, in levels of the sensor; of a delay, in sampling intervals. [-]"""
+
+PRIOR_CAUSE, MOST_LIKELY, PRIOR_TOLERANCES, PRIOR_DATA, PRIOR_NEXT_DATA = 0.5, 0.05, 0.1, 0.1, 0.3
+"""Prior odds that any one cause acts, and most of a single one; that tolerances are too narrow; that the readings of a
+channel have any one error; and of such an error in a logger that has one already. [-]"""
+
+ONSET_ODDS = 0.2
+"""Odds that a cause begins in the middle of a record, over those that it holds throughout. [-]"""
+ONSET_SHARES = tuple(np.arange(0.1, 0.95, 0.1).tolist())
+"""Where a search for an onset begins, over the duration of a record. [-]"""
+
+KNOWN: tuple[tuple[float, float, str], ...] = (
+    (-1.0, 0.0, "the other sign"),
+    (180.0 / math.pi, 0.0, "degrees for radians"),
+    (math.pi / 180.0, 0.0, "radians for degrees"),
+    (1.0 / 0.3048, 0.0, "feet for metres"),
+    (0.3048, 0.0, "metres for feet"),
+    (3.6 / 1.852, 0.0, "knots for m/s"),
+    (1.852 / 3.6, 0.0, "m/s for knots"),
+    (3.6, 0.0, "km/h for m/s"),
+    (10.0, 0.0, "ten times too large"),
+    (0.1, 0.0, "ten times too small"),
+    (100.0, 0.0, "a hundred times too large"),
+    (0.01, 0.0, "a hundred times too small"),
+    (1000.0, 0.0, "a thousand times too large"),
+    (0.001, 0.0, "a thousand times too small"),
+    (10.055, 0.0, "kPa for metres of sea water"),
+    (60.0, 0.0, "per minute for per second"),
+    (1.0 / 60.0, 0.0, "per second for per minute"),
+)
+"""Errors of a logger that people make: factor, offset in turns, words. Each is a peak of the prior."""
+KNOWN_ANGLES: tuple[tuple[float, float, str], ...] = (
+    (1.0, 0.25, "a quarter of a turn too large"),
+    (1.0, -0.25, "a quarter of a turn too small"),
+    (1.0, 0.5, "half a turn off"),
+    (-1.0, 0.25, "counted from east, against the clock"),
+)
+"""The same for angles."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A free number of an explanation.
+
+    Attributes:
+        kind: number, start, cause, since, unknown, offset, gain, drift, delay.
+        name: of the parameter, cause and number ("overflow.lip"), unknown input, or channel.
+        record: which it belongs to; −1 if all share it.
+        centre, sd: mean and standard deviation of its prior. [its unit]
+        low, high: bounds. [its unit]
+        knot: of an unknown input.
+    """
+
+    kind: str
+    name: str
+    centre: float
+    sd: float
+    record: int = -1
+    low: float = -math.inf
+    high: float = math.inf
+    knot: int = 0
+
+    @property
+    def identity(self) -> tuple[str, str, int, int]:
+        """What it is, whatever its prior."""
+        return (self.kind, self.name, self.record, self.knot)
+
+
+@dataclass(frozen=True)
+class Term:
+    """A term of an explanation.
+
+    Attributes:
+        id: such as "overflow", "overflow@12", "scale:depth", "unit:depth".
+        sentence: what it says, in words.
+        kind: cause, tolerances, offset, scale, affine, unit, drift, delay, stuck.
+        target: the cause, or the channel.
+        odds: prior odds that it holds.
+        begins: time from which it holds; −∞ throughout. [s]
+        ends: time until which it holds. [s]
+        record: in which it holds; −1 in all.
+        factor, offset: known values of y = offset + factor x. [-], [unit of the channel]
+        size: where a search begins, in standard deviations of its numbers.
+    """
+
+    id: str
+    sentence: str
+    kind: str
+    target: str = ""
+    odds: float = 0.01
+    begins: float = -math.inf
+    ends: float = math.inf
+    record: int = -1
+    factor: float = 1.0
+    offset: float = 0.0
+    size: float = 0.0
+
+    @property
+    def is_data_error(self) -> bool:
+        """Whether it is about the record, not about the model."""
+        return self.kind not in ("cause", "tolerances")
+
+    @property
+    def slot(self) -> tuple[str, str]:
+        """What an explanation can have only one of: a channel's y = a + b x, one cause."""
+        affine = ("offset", "scale", "affine", "unit")
+        return ("y = a + b x" if self.kind in affine else self.kind, self.target)
+
+
+Terms = tuple[Term, ...]
+"""An explanation; () is "nothing is wrong"."""
+
+
+def ids(terms: Iterable[Term]) -> tuple[str, ...]:
+    """Return the ids of terms, in alphabetical order."""
+    return tuple(sorted(term.id for term in terms))
+
+
+def with_term(terms: Terms, term: Term) -> Terms:
+    """Return an explanation with one more term, in the place of one that says something about the same."""
+    kept = [other for other in terms if other.slot != term.slot]
+    return tuple(sorted([*kept, term], key=lambda other: other.id))
+
+
+def without(terms: Terms, term: Term) -> Terms:
+    """Return an explanation without a term."""
+    return tuple(other for other in terms if other.id != term.id)
+
+
+def log_prior(terms: Terms, loggers: dict[str, str]) -> float:
+    """Return the log prior odds of an explanation over "nothing is wrong".
+
+    Errors of one logger come together: every one after the first has the odds of the next, whatever its channel.
+    """
+    total, before = 0.0, set[str]()
+    for term in sorted(terms, key=lambda term: -term.odds):
+        if term.is_data_error:
+            logger = loggers.get(term.target, "")
+            total += math.log(term.odds * (PRIOR_NEXT_DATA / PRIOR_DATA if logger in before else 1.0))
+            before.add(logger)
+        else:
+            total += math.log(term.odds)
+    return total
+
+
+def cause_terms(model: Model, duration: float) -> list[Term]:
+    """Return a term of every cause, and of those that may begin in the middle of a record."""
+    odds = min(PRIOR_CAUSE / max(len(model.causes), 1), MOST_LIKELY)
+    found = []
+    for cause in model.causes:
+        for size in cause.sizes if cause.numbers else (0.0,):
+            found.append(Term(cause.id, cause.sentence, "cause", cause.id, odds, size=size))
+        if cause.onset:
+            found += [
+                Term(
+                    f"{cause.id}@",
+                    f"from some time on, {cause.sentence}",
+                    "cause",
+                    cause.id,
+                    ONSET_ODDS * odds,
+                    begins=share * duration,
+                    ends=duration,
+                )
+                for share in ONSET_SHARES
+            ]
+    return found
+
+
+def tolerance_term(model: Model) -> Term:
+    """Return the term of wider tolerances."""
+    return Term("tolerances", "the parameters are farther off than their tolerances say", "tolerances", "", PRIOR_TOLERANCES)
+
+
+def data_terms(model: Model) -> list[Term]:
+    """Return terms of the errors that the data of every channel may have throughout, but for trusted channels."""
+    found: list[Term] = []
+    suspects = [name for name, sensor in model.channels.items() if not sensor.trusted]
+    odds = PRIOR_DATA
+    for name in suspects:
+        sensor = model.channels[name]
+        known = [(f, sensor.turn * turns, words) for f, turns, words in (*KNOWN, *(KNOWN_ANGLES if sensor.angle else ()))]
+        soft = [("offset", "has an offset"), ("scale", "has an error of scale"), ("affine", "has another scale and zero")]
+        soft += [("drift", "drifts"), ("delay", "is late or early")]
+        found += [Term(f"{kind}:{name}", f"{name} {words}", kind, name, odds / len(soft)) for kind, words in soft]
+        found += [
+            Term(f"unit:{name}", f"{name}: {words}", "unit", name, odds / len(known), factor=factor, offset=offset)
+            for factor, offset, words in known
+        ]
+    if model.inputs:
+        found.append(Term(f"delay:{INPUTS}", INPUTS_LATE, "delay", INPUTS, PRIOR_DATA / 5.0))
+    return found
+
+
+def from_time(term: Term, record: int, time: float, share: float) -> Term:
+    """Return a data error that begins at a time of a record, with a share of its odds. [s]"""
+    return replace(
+        term,
+        id=f"{term.id}@{record}",
+        sentence=f"from {time:.4g} s on, {term.sentence}",
+        begins=time,
+        record=record,
+        odds=share * term.odds,
+    )
+
+
+def entries_of(terms: Terms, model: Model, levels: dict[str, float], intervals: dict[str, float]) -> list[Entry]:
+    """Return the free numbers that terms bring, and those of the model with the prior that the terms leave them.
+
+    Args:
+        terms: of the explanation.
+        model: whose parameters they are.
+        levels: channel → level of its sensor. [unit]
+        intervals: channel → its sampling interval. [s]
+    """
+    found = [
+        Entry("number", number.name, number.nominal, _spread(number.name, number.tolerance, terms, model), -1, number.low, number.high)
+        for number in model.shared
+    ]
+    causes = {cause.id: cause for cause in model.causes}
+    for term in terms:
+        if term.kind == "cause":
+            found += _of_cause(causes[term.target], term)
+        elif term.is_data_error:
+            found += _of_data_error(term, levels[term.target], intervals[term.target])
+    return found
+
+
+def _spread(name: str, tolerance: float, terms: Sequence[Term], model: Model) -> float:
+    """Return the prior standard deviation of a parameter under some terms."""
+    causes = {cause.id: cause for cause in model.causes}
+    variance = tolerance**2
+    if any(term.kind == "tolerances" for term in terms):
+        variance *= WIDER**2
+    if any(not model.channels[channel].trusted for channel in model.tuned_on.get(name, ())):
+        variance *= TUNED_WIDER**2
+    variance += sum(causes[term.target].changes.get(name, 0.0) ** 2 for term in terms if term.kind == "cause" and math.isinf(term.begins))
+    return math.sqrt(variance)
+
+
+def _of_cause(cause: Cause, term: Term) -> list[Entry]:
+    found = [
+        Entry("cause", f"{cause.id}.{name}", number.nominal, number.tolerance, -1, number.low, number.high)
+        for name, number in cause.numbers.items()
+    ]
+    if math.isfinite(term.begins):
+        found += [Entry("change", f"{cause.id}.{name}", 0.0, size) for name, size in cause.changes.items()]
+        found.append(Entry("since", cause.id, term.begins, term.ends / math.sqrt(2.0 * math.pi), -1, 0.0, term.ends))
+    return found
+
+
+def _of_data_error(term: Term, level: float, interval: float) -> list[Entry]:
+    offset = Entry("offset", term.target, 0.0, OFFSET_LEVELS * level)
+    gain = Entry("gain", term.target, 0.0, GAIN_SCALE, -1, -0.9, 9.0)
+    return {
+        "offset": [offset],
+        "scale": [gain],
+        "affine": [offset, gain],  # about the regression, which is in the term
+        "drift": [Entry("drift", term.target, 0.0, OFFSET_LEVELS * level)],
+        "delay": [Entry("delay", term.target, 0.0, DELAY_INTERVALS * interval)],
+    }.get(term.kind, [])

@@ -1,0 +1,157 @@
+"""Locks on a name, besides its probability: it must improve the prediction of what was not fitted, with each record
+left out, and survive wider tolerances.
+
+    gain = Σ (e/ν)² without the term − Σ (e/ν)² with it     in free simulation of readings that were not fitted
+
+The interval of the gain is a bootstrap over blocks of time (Künsch 1989), as residuals are correlated.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from subzero.identification.explanation import Entry, Term, Terms, tolerance_term, with_term, without
+from subzero.identification.fit import Fit, fit, free_fit
+from subzero.identification.problem import Problem
+from subzero.identification.record import Record
+
+FITTED_SHARE = 0.6
+"""Share of a single record that is fitted, where the rest is predicted. [-]"""
+BLOCKS, DRAWS, SURE = 20, 2000, 0.05
+"""Blocks of a record, draws of the bootstrap, and the quantile that must be above 0."""
+ALIVE = 2.0
+"""Least gain of a term in log evidence where all tolerances are wider. [nats]"""
+
+
+@dataclass(frozen=True)
+class Gain:
+    """How much a term improves the prediction of readings that were not fitted.
+
+    Attributes:
+        before, after: root mean square of residuals in free simulation, in levels of the sensors.
+        low: lower end of an interval of the improvement of the mean square, in squared levels.
+        what: the readings that were predicted.
+    """
+
+    before: float
+    after: float
+    low: float
+    what: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether the improvement is surely there."""
+        return self.low > 0.0
+
+
+@dataclass(frozen=True)
+class Locks:
+    """The locks of a term.
+
+    Attributes:
+        gain: on what was not fitted; None if that cannot be tried, as it begins too late.
+        alive: gain in log evidence where tolerances are wider. [nats]
+        reasons: why it may not be named; () if it may.
+    """
+
+    gain: Gain | None
+    alive: float
+    reasons: tuple[str, ...]
+
+
+def locks(problem: Problem, best: Fit, held_out: Sequence[Record]) -> dict[str, Locks]:
+    """Return the locks of every term of the best explanation: id → locks."""
+    return {term.id: _locks(problem, best, term, held_out) for term in best.terms if term.kind != "tolerances"}
+
+
+def _locks(problem: Problem, best: Fit, term: Term, held_out: Sequence[Record]) -> Locks:
+    gain = held_out_gain(problem, best, term, held_out)
+    alive = _alive(problem, best, term)
+    reasons = []
+    if gain is not None and not gain.holds:
+        reasons.append(
+            f"it does not surely predict {gain.what}: {gain.before:.2f} levels of the sensors without it, "
+            f"{gain.after:.2f} with it"
+        )
+    if alive < ALIVE:
+        reasons.append("wider tolerances of the parameters explain as much")
+    return Locks(gain, alive, tuple(reasons))
+
+
+def _alive(problem: Problem, best: Fit, term: Term) -> float:
+    """Return the gain of a term in log evidence where tolerances are wider, and begin where they are best."""
+    wider = tolerance_term(problem.model)
+    having = fit(problem, with_term(best.terms, wider), best.values, best.linear.levels)
+    lacking = fit(problem, with_term(without(best.terms, term), wider), best.values, best.linear.levels)
+    return having.log_evidence - lacking.log_evidence
+
+
+def held_out_gain(problem: Problem, best: Fit, term: Term, held_out: Sequence[Record]) -> Gain | None:
+    """Return the gain of a term in free simulation of what was not fitted; None if that cannot be tried.
+
+    Of several records each is predicted by a fit of the others; of a single one the last part by a fit of the first.
+    """
+    if held_out:
+        folds = [(list(problem.records), list(held_out), -math.inf)]
+        what = "the records that were held out"
+    elif len(problem.records) > 1:
+        folds = [
+            (problem.records[:k] + problem.records[k + 1 :], [record], -math.inf)
+            for k, record in enumerate(problem.records)
+        ]
+        what = "each record by a fit of the others"
+    else:
+        (record,) = problem.records
+        split = float(record.time[0] + FITTED_SHARE * np.ptp(record.time))
+        if (math.isfinite(term.begins) and term.kind == "cause") or term.begins > split or term.kind == "stuck":
+            return None
+        folds = [([record.between(-math.inf, split)], [record], split)]
+        what = "the last part of the record by a fit of the first"
+    having = _predicted(problem, best, best.terms, folds)
+    lacking = _predicted(problem, best, without(best.terms, term), folds)
+    return _gain(having, lacking, what)
+
+
+Fold = tuple[Sequence[Record], Sequence[Record], float]
+"""Records that are fitted, records that are predicted, the time from which predictions count."""
+
+
+def _predicted(problem: Problem, best: Fit, terms: Terms, folds: Sequence[Fold]) -> list[np.ndarray]:
+    """Return squared residuals of predictions, in levels of the sensors: one row of time for each channel of a fold."""
+    squares = []
+    for fitted_records, predicted_records, begin in folds:
+        here = tuple(replace(term, record=-1) for term in terms)
+        learned = free_fit(Problem(problem.model, fitted_records), here, _shared(best))
+        fixed = {entry.identity: value for entry, value in learned.values.items() if entry.record < 0}
+        there = Problem(problem.model, predicted_records, fixed)
+        predicted = free_fit(there, here, learned.values if begin > -math.inf else {})
+        for name, e in predicted.linear.e.items():
+            kept = there.used(name, here) & (there.channels[name].time > begin)
+            if name in problem.levels and kept.any():
+                squares.append((e[kept] / problem.levels[name]) ** 2)
+    return squares
+
+
+def _shared(best: Fit) -> dict[Entry, float]:
+    """Return the numbers of a fit that all records share."""
+    return {entry: value for entry, value in best.values.items() if entry.record < 0}
+
+
+def _gain(having: Sequence[np.ndarray], lacking: Sequence[np.ndarray], what: str) -> Gain:
+    """Return the gain between squared residuals with and without a term, with its bootstrap interval."""
+    better = np.concatenate([b - a for a, b in zip(having, lacking, strict=True)])
+    blocks = np.array([np.mean(part) for part in np.array_split(better, min(BLOCKS, better.size))])
+    draws = np.random.default_rng(0).integers(0, blocks.size, (DRAWS, blocks.size))
+    low = float(np.quantile(blocks[draws].mean(axis=1), SURE)) if np.isfinite(blocks).all() else _sign(having, lacking)
+    before, after = (float(np.sqrt(np.mean(np.concatenate(rows)))) for rows in (lacking, having))
+    return Gain(before, after, low, what)
+
+
+def _sign(having: Sequence[np.ndarray], lacking: Sequence[np.ndarray]) -> float:
+    """Return the gain where a free simulation fails: infinite if only that without the term does."""
+    fails = [not np.isfinite(np.concatenate(rows)).all() for rows in (having, lacking)]
+    return math.inf if fails == [False, True] else -math.inf

@@ -1,0 +1,131 @@
+"""Is the model near at all? For each channel what the best explanation leaves; how large the unknown inputs have to be;
+how far it bends what it does not name.
+
+    R = rms(what is left) / level of the sensor     after the unknown inputs, and in a free simulation without them
+    size / declared size                            of every unknown input
+    |θ − c| / τ                                     of every parameter that no term names
+
+Where one of them is large, no cause and no error in the data is named, whatever its probability: evidence compares
+explanations with each other, not with the truth (Kennedy & O'Hagan 2001; Brynjarsdóttir & O'Hagan 2014).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from subzero.identification.fit import Fit
+from subzero.identification.problem import Problem
+
+NEAR_LEFT = 1.5
+"""Largest ratio of what is left, after the unknown inputs, to the level of a sensor. [-]"""
+NEAR_SIZE = 3.0
+"""Largest ratio of an unknown input's size to the declared one. [-]"""
+NEAR_BEND = 4.0
+"""Farthest that a parameter which is not named may be from its nominal value, in tolerances. [-]"""
+
+
+@dataclass(frozen=True)
+class Left:
+    """What an explanation leaves of a channel, root mean squares. [unit of the channel]
+
+    Attributes:
+        channel: its name.
+        unit: as it is shown.
+        level: of its sensor.
+        free: left by a free simulation, unknown inputs at 0.
+        followed: left where the unknown inputs follow the record.
+    """
+
+    channel: str
+    unit: str
+    level: float
+    free: float
+    followed: float
+
+    @property
+    def ratio(self) -> float:
+        """R of the free simulation."""
+        return self.free / self.level
+
+
+@dataclass(frozen=True)
+class Nearness:
+    """How near the best explanation is to the records.
+
+    Attributes:
+        left: of every channel.
+        sizes: unknown input → (its size, the declared one). [unit of the input]
+        bends: parameter that is not named → its deviation, in tolerances; the farthest first.
+        reasons: why the model is not near; () if it is.
+    """
+
+    left: tuple[Left, ...]
+    sizes: dict[str, tuple[float, float]]
+    bends: dict[str, float]
+    reasons: tuple[str, ...]
+
+    @property
+    def near(self) -> bool:
+        """Whether causes and errors in the data may be named."""
+        return not self.reasons
+
+
+def nearness(problem: Problem, fitted: Fit, free: Fit) -> Nearness:
+    """Return how near an explanation is, given its fit, and that in free simulation."""
+    left = left_by(problem, fitted, free)
+    sizes = {
+        unknown.name: (fitted.linear.levels.sizes[unknown.name] * unknown.size, unknown.size) for unknown in problem.model.unknown
+    }
+    bends = _bends(problem, fitted)
+    reasons = [
+        f"{each.channel}: {each.followed:.3g} {each.unit} are left, {each.followed / each.level:.1f} times what its "
+        f"sensor may err ({each.level:.3g})"
+        for each in left
+        if each.followed > NEAR_LEFT * each.level
+    ]
+    reasons += [
+        f"the model misses an input {name!r} of {size:.3g}, {size / declared:.1f} times the declared size"
+        for name, (size, declared) in sizes.items()
+        if size > NEAR_SIZE * declared
+    ]
+    reasons += [
+        f"{name} has to be {bend:.1f} tolerances off its nominal value"
+        for name, bend in bends.items()
+        if bend > NEAR_BEND
+    ]
+    return Nearness(tuple(left), sizes, bends, tuple(reasons))
+
+
+def left_by(problem: Problem, fitted: Fit, free: Fit) -> list[Left]:
+    """Return what an explanation leaves of every channel."""
+    return [
+        Left(
+            name,
+            problem.model.channels[name].unit,
+            problem.levels[name],
+            rms(free.linear.e[name][used]),
+            rms(fitted.linear.e[name][used]),
+        )
+        for name in problem.channels
+        for used in [problem.used(name, fitted.terms)]
+    ]
+
+
+def rms(values: np.ndarray) -> float:
+    """Return the root mean square of values (m,); infinite if one is not finite."""
+    return float(np.sqrt(np.mean(values**2))) if np.isfinite(values).all() else float("inf")
+
+
+def _bends(problem: Problem, fitted: Fit) -> dict[str, float]:
+    """Return how far parameters that no term names are from their nominal values, in tolerances."""
+    tolerance = {number.name: number.tolerance for number in problem.model.shared}
+    named = {name for cause in problem.model.causes for name in cause.changes if cause.id in {t.target for t in fitted.terms}}
+    calibrated = any(term.kind == "tolerances" for term in fitted.terms)
+    found = {
+        entry.name: abs(value - entry.centre) / (entry.sd if calibrated or entry.name in problem.model.tuned_on else tolerance[entry.name])
+        for entry, value in zip(fitted.entries, fitted.x.tolist(), strict=True)
+        if entry.kind == "number" and entry.name not in named
+    }
+    return dict(sorted(found.items(), key=lambda pair: -pair[1]))

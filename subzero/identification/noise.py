@@ -1,0 +1,143 @@
+"""The noise of a channel: a white part with rounding, and a slow part; whitening with it.
+
+    Σ_ij = (σ_w² + q²/12) δ_ij + σ_s² exp(−|t_i − t_j|/τ_s)
+
+Σ is never formed: a Kalman filter with the slow part as its state turns a residual into its innovations, which are
+white (Rasmussen & Williams 2006, app. B; Hartikainen & Särkkä 2010).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from subzero.jit import compiled
+
+DECLARED_SPREAD, OPEN_SPREAD = 0.1, 1.0
+"""Standard deviation of log σ_w about a declared level, and about one that was read off the record. [-]"""
+BINDING = 5.0
+"""A declared level binds: σ_w is no farther from it, in standard deviations of its logarithm. [-]"""
+SLOW_SHARE, SLOW_SPREAD = 0.3, 0.7
+"""Usual slow part of a sensor, over its level, and the standard deviation of its logarithm; it never exceeds the
+level: what is slow and larger is no noise of a sensor. [-]"""
+TIME_SPREAD = 1.0
+"""Standard deviation of log τ_s about ten sampling intervals. [-]"""
+MAX_SLOW = 1.0
+"""Largest slow part, over the level. [-]"""
+FLOOR_SHARE = 1e-6
+"""Least level of a sensor whose noise was neither declared nor is seen, over the spread of its readings. [-]"""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """σ_w, σ_s [unit of the channel] and τ_s [s]."""
+
+    white: float
+    slow: float
+    time: float
+
+
+@dataclass(frozen=True)
+class NoisePrior:
+    """What is known of a sensor before a fit: level and resolution [unit], interval of samples [s]."""
+
+    level: float
+    resolution: float
+    interval: float
+    declared: bool
+
+    def usual(self) -> Noise:
+        """Return the noise at its median."""
+        return Noise(self.level, SLOW_SHARE * self.level, 10.0 * self.interval)
+
+    def log_density(self, noise: Noise) -> float:
+        """Return the log prior density of a noise, up to a constant."""
+        if noise.slow > MAX_SLOW * self.level * (1.0 + 1e-9):
+            return -np.inf
+        if self.declared and abs(np.log(noise.white / self.level)) > BINDING * DECLARED_SPREAD:
+            return -np.inf
+        spread = DECLARED_SPREAD if self.declared else OPEN_SPREAD
+        off = (
+            np.log(noise.white / self.level) / spread,
+            np.log(noise.slow / (SLOW_SHARE * self.level)) / SLOW_SPREAD,
+            np.log(noise.time / (10.0 * self.interval)) / TIME_SPREAD,
+        )
+        return -0.5 * float(np.sum(np.square(off)))
+
+
+def resolution_of(values: np.ndarray) -> float:
+    """Return the step that readings (n,) are multiples of; 0 where there is none, or only one reading."""
+    distinct = np.unique(values[np.isfinite(values)])
+    if distinct.size < 3 or distinct.size > 0.9 * np.isfinite(values).sum():
+        return 0.0
+    step = float(np.min(np.diff(distinct)))
+    ratio = (distinct - distinct[0]) / step
+    return step if np.max(np.abs(ratio - np.rint(ratio))) < 0.05 else 0.0
+
+
+def level_of(values: np.ndarray, resolution: float) -> float:
+    """Return the level of a sensor as its readings (n,) show it: from their second differences, which a slow signal
+    hardly has; at least that of its rounding.
+
+    1.4826 makes a median absolute deviation a standard deviation; the second difference of white noise has √6 times
+    its own.
+    """
+    seen = values[np.isfinite(values)]
+    rough = 1.4826 * float(np.median(np.abs(np.diff(seen, 2)))) / np.sqrt(6.0) if seen.size > 4 else 0.0
+    floor = FLOOR_SHARE * float(np.ptp(seen)) if seen.size else 0.0
+    return max(rough, resolution / np.sqrt(12.0), floor, np.finfo(float).tiny ** 0.25)
+
+
+@dataclass(frozen=True, eq=False)
+class Filter:
+    """The filter of a noise over some samples: decay to the next sample, gain, scale of the innovations (m,)."""
+
+    decay: np.ndarray
+    gain: np.ndarray
+    scale: np.ndarray
+
+    @classmethod
+    def of(cls, noise: Noise, resolution: float, times: np.ndarray) -> Filter:
+        """Return the filter at the times of the samples (m,); where they fall, a new record begins. [s]"""
+        steps = np.diff(times, append=times[-1:])
+        decay = np.where(steps >= 0.0, np.exp(-np.abs(steps) / noise.time), 0.0)
+        gain, scale = np.empty(times.size), np.empty(times.size)
+        gains(decay, noise.white**2 + resolution**2 / 12.0, noise.slow**2, gain, scale)
+        return cls(decay, gain, scale)
+
+    @property
+    def log_scale(self) -> float:
+        """½ log det Σ."""
+        return float(np.sum(np.log(self.scale)))
+
+    def whiten(self, columns: np.ndarray) -> np.ndarray:
+        """Return the innovations of columns (m, k), of level 1."""
+        white = np.empty_like(columns)
+        innovations(self.decay, self.gain, self.scale, np.ascontiguousarray(columns), white)
+        return white
+
+
+@compiled
+def gains(decay: np.ndarray, white: float, slow: float, gain: np.ndarray, scale: np.ndarray) -> None:
+    """Fill the Kalman gain, and the standard deviation of the innovation, of every sample (m,)."""
+    left = slow
+    for i in range(decay.size):
+        seen = left + white
+        gain[i] = left / seen
+        scale[i] = np.sqrt(seen)
+        # What the sample leaves unknown decays to the next one, and the process adds to it.
+        left = decay[i] * decay[i] * left * (1.0 - gain[i]) + slow * (1.0 - decay[i] * decay[i])
+
+
+@compiled
+def innovations(
+    decay: np.ndarray, gain: np.ndarray, scale: np.ndarray, values: np.ndarray, white: np.ndarray
+) -> None:
+    """Fill the innovations of columns (m, k): each value less its prediction, over its standard deviation."""
+    for j in range(values.shape[1]):
+        expected = 0.0
+        for i in range(values.shape[0]):
+            new = values[i, j] - expected
+            white[i, j] = new / scale[i]
+            expected = decay[i] * (expected + gain[i] * new)

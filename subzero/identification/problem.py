@@ -1,0 +1,369 @@
+"""Records and a model, as residuals of any explanation: e = corrected record − simulation."""
+
+from __future__ import annotations
+
+from copy import copy
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from subzero.errors import UserError
+from subzero.identification.explanation import INPUTS, Entry, Term, Terms, entries_of
+from subzero.identification.model import COMMAND, Cause, Model
+from subzero.identification.noise import NoisePrior, level_of, resolution_of
+from subzero.identification.record import Record
+from subzero.identification.simulation import Asked, Runs
+
+STEP = 0.1
+"""Step of a sensitivity, over the standard deviation of a number's prior. [-]"""
+FEWEST_SAMPLES = 8
+"""A channel with fewer readings in all records is not used."""
+SPIKE = 8.0
+"""A reading so many levels off the median of its neighbours, which agree with one another, is set aside. [-]"""
+MAX_KNOTS = 200
+"""Most knots of one unknown input in one record: its time is lengthened where there would be more."""
+FIXED = 1e-6
+"""Prior standard deviation of a number that is fixed, over its own. [-]"""
+CORRECTIONS = ("offset", "gain", "drift", "delay")
+"""Entries that change the record, not the simulation."""
+
+Progress = Callable[[float, str], None]
+"""(share that is done, what is being done)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Readings of a channel in all records, one after the other.
+
+    Attributes:
+        time: of each (m,). [s]
+        values: as recorded (m,).
+        record: which each belongs to (m,).
+        used: which are finite, and no spikes (m,).
+        prior: of the sensor.
+    """
+
+    time: np.ndarray
+    values: np.ndarray
+    record: np.ndarray
+    used: np.ndarray
+    prior: NoisePrior
+
+
+class Problem:
+    """Records and a model.
+
+    Args:
+        model: of the records.
+        records: one or more.
+        fixed: numbers that a fit may not move: identity of an entry → value.
+
+    Raises:
+        UserError: a record has no channel or not all inputs of the model.
+        ModelError: the model cannot be used.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        records: Sequence[Record],
+        fixed: Mapping[tuple[str, str, int, int], float] = MappingProxyType({}),
+    ) -> None:
+        self.model, self.records, self.fixed = model, list(records), fixed
+        if not self.records:
+            raise UserError("there is no record. Give one, or several.")
+        self.inputs = [{name: _input(record, name) for name in model.inputs} for record in self.records]
+        self.runs = [
+            Runs(model, record.time, inputs, record.name)
+            for record, inputs in zip(self.records, self.inputs, strict=True)
+        ]
+        self.channels = {name: found for name in model.channels if (found := self._readings(name)) is not None}
+        if not self.channels:
+            have = ", ".join(self.records[0].columns) or "nothing"
+            raise UserError(
+                f"{self.records[0].name}: no channel of the model has {FEWEST_SAMPLES} readings. The model has "
+                f"{', '.join(model.channels)}; the record has {have}."
+            )
+        empty = self.entries(())
+        for k, run in enumerate(self.runs):
+            own = [entry for entry in empty if _moves(entry, k)]
+            run.check(self._asked(k, own, np.array([entry.centre for entry in own])))
+
+    def with_fixed(self, fixed: Mapping[tuple[str, str, int, int], float]) -> Problem:
+        """Return the same problem with more numbers fixed; runs are shared."""
+        found = copy(self)
+        found.fixed = {**self.fixed, **fixed}
+        return found
+
+    def _readings(self, name: str) -> Readings | None:
+        """Return a channel in all records; None if it has too few readings."""
+        sensor = self.model.channels[name]
+        having = [(k, record) for k, record in enumerate(self.records) if name in record.columns]
+        if not having:
+            return None
+        time = np.concatenate([record.times_of(name) for _, record in having])
+        values = np.concatenate([record.columns[name] for _, record in having])
+        of = np.concatenate([np.full(record.times_of(name).size, k) for k, record in having])
+        inside = np.concatenate(
+            [
+                (record.times_of(name) >= record.time[0]) & (record.times_of(name) <= record.time[-1])
+                for _, record in having
+            ]
+        )
+        finite = np.isfinite(values) & inside
+        if finite.sum() < FEWEST_SAMPLES:
+            return None
+        step = sensor.resolution if sensor.resolution is not None else resolution_of(values)
+        level = sensor.noise if sensor.noise is not None else level_of(values, step)
+        steps = np.diff(time)
+        prior = NoisePrior(level, step, float(np.median(steps[steps > 0.0])), sensor.noise is not None)
+        used = finite & ~_spikes(values, SPIKE * max(level, step), sensor.turn)
+        return Readings(time, values, of, used, prior)
+
+    @cached_property
+    def levels(self) -> dict[str, float]:
+        """Channel → level of its sensor with its rounding. [unit]"""
+        return {
+            name: float(np.hypot(each.prior.level, each.prior.resolution / np.sqrt(12.0)))
+            for name, each in self.channels.items()
+        } | {INPUTS: 1.0}
+
+    @cached_property
+    def intervals(self) -> dict[str, float]:
+        """Channel → its sampling interval. [s]"""
+        own = {name: each.prior.interval for name, each in self.channels.items()}
+        return {**own, INPUTS: float(np.median(np.diff(self.records[0].time)))}
+
+    @cached_property
+    def knots(self) -> list[dict[str, np.ndarray]]:
+        """Of each record, unknown input → times of its knots. [s]"""
+        found = []
+        for record in self.records:
+            start, end = record.time[0], record.time[-1]
+            counts = {
+                unknown.name: int(np.clip(np.ceil((end - start) / unknown.time), 1, MAX_KNOTS)) + 1
+                for unknown in self.model.unknown
+            }
+            found.append({name: np.linspace(start, end, count) for name, count in counts.items()})
+        return found
+
+    def entries(self, terms: Terms) -> list[Entry]:
+        """Return all free numbers of an explanation: of the model, its terms, starts and unknown inputs."""
+        own = entries_of(terms, self.model, self.levels, self.intervals)
+        starts = [
+            Entry("start", number.name, number.nominal, number.tolerance, k, number.low, number.high)
+            for k in range(len(self.records))
+            for number in self.model.starts
+        ]
+        unknown = [
+            Entry("unknown", each.name, 0.0, each.size, k, knot=i)
+            for k in range(len(self.records))
+            for each in self.model.unknown
+            for i in range(self.knots[k][each.name].size)
+        ]
+        return [self._as_fixed(entry) for entry in (*own, *starts, *unknown)]
+
+    def _as_fixed(self, entry: Entry) -> Entry:
+        """Return an entry, at its value where it is fixed."""
+        if entry.identity not in self.fixed:
+            return entry
+        return replace(entry, centre=self.fixed[entry.identity], sd=FIXED * entry.sd)
+
+    def _readings_of(
+        self, k: int, entries: Sequence[Entry], sets: Sequence[np.ndarray], *, must: bool
+    ) -> list[dict[str, np.ndarray] | None]:
+        """Return readings of record k with sets of entries; only what moves an entry of its own is asked for."""
+        own = [i for i, entry in enumerate(entries) if _moves(entry, k)]
+        mine = [entries[i] for i in own]
+        keys = [x[own].tobytes() for x in sets]
+        new = {key: self._asked(k, mine, x[own]) for key, x in zip(keys, sets, strict=True)}
+        found = dict(zip(new, self.runs[k].readings(list(new.values()), must=must), strict=True))
+        return [found[key] for key in keys]
+
+    def _asked(self, k: int, entries: Sequence[Entry], x: np.ndarray) -> Asked:
+        """Return the run of record k with entries at x."""
+        numbers, late = dict(self._nominal), 0.0
+        values = {name: np.zeros(knots.size) for name, knots in self.knots[k].items()}
+        for entry, value in zip(entries, x.tolist(), strict=True):
+            if entry.kind == "unknown":
+                values[entry.name][entry.knot] = value
+            elif entry.kind == "delay":
+                late = value
+            else:
+                numbers[f"{entry.name}.since" if entry.kind == "since" else entry.name] = value
+        time = self.records[k].time
+        unknown = {name: np.interp(time, self.knots[k][name], row) for name, row in values.items()}
+        return Asked(numbers, unknown, late)
+
+    @cached_property
+    def _nominal(self) -> dict[str, float]:
+        """The numbers of the nominal model, those of its causes off, by their names "cause.number"."""
+        return {name: value for name, value in self.model.nominal().items() if not isinstance(value, dict)}
+
+    def residuals(
+        self, terms: Terms, entries: Sequence[Entry], sets: Sequence[np.ndarray], *, must: bool = False
+    ) -> tuple[dict[str, np.ndarray], np.ndarray]:
+        """Return channel → residuals (m, k) of k sets of entries, and which sets could be simulated (k,)."""
+        runs = [self._readings_of(k, entries, sets, must=must) for k in range(len(self.records))]
+        valid = np.array([all(of[j] is not None for of in runs) for j in range(len(sets))])
+        found = {}
+        for name, each in self.channels.items():
+            columns = np.full((each.values.size, len(sets)), np.nan)
+            recorded, sensor = self.recorded(name, terms), self.model.channels[name]
+            for j in np.flatnonzero(valid).tolist():
+                simulated = self._simulated(name, [of[j] or {} for of in runs], entries, sets[j])
+                shown = self.shown(name, terms, entries, sets[j], simulated)
+                columns[:, j] = self._wrapped(name, recorded - np.clip(shown, sensor.low, sensor.high))
+            found[name] = columns
+        return found, valid
+
+    def _simulated(
+        self, name: str, readings: Sequence[Mapping[str, np.ndarray]], entries: Sequence[Entry], x: np.ndarray
+    ) -> np.ndarray:
+        """Return simulated readings of a channel at its times (m,)."""
+        each = self.channels[name]
+        late = sum(x[i] for i, entry in enumerate(entries) if entry.kind == "delay" and entry.name == name)
+        found = np.empty(each.values.size)
+        for k, record in enumerate(self.records):
+            at = each.record == k
+            if at.any():
+                found[at] = np.interp(each.time[at] - late, record.time, readings[k][name])
+        return found
+
+    def recorded(self, name: str, terms: Terms) -> np.ndarray:
+        """Return the readings of a channel with its known errors undone: (y − a)/b (m,), noise with them."""
+        each = self.channels[name]
+        values = each.values.copy()
+        for term in self._errors(name, terms):
+            at = self._where(each, term)
+            values[at] = (values[at] - term.offset) / term.factor
+        return values
+
+    def shown(
+        self, name: str, terms: Terms, entries: Sequence[Entry], x: np.ndarray, simulated: np.ndarray
+    ) -> np.ndarray:
+        """Return what a sensor with free errors shows of simulated readings h: a + (1 + g) h + d τ (m,)."""
+        each = self.channels[name]
+        free = {entry.kind: x[i] for i, entry in enumerate(entries) if entry.name == name and entry.kind in CORRECTIONS}
+        values = simulated.copy()
+        for term in self._errors(name, terms):
+            at = self._where(each, term)
+            if term.kind == "drift":
+                values[at] += free["drift"] * self._ramp(each)[at]
+            elif term.slot[0] == "y = a + b x":
+                values[at] = free.get("offset", 0.0) + (1.0 + free.get("gain", 0.0)) * values[at]
+        return values
+
+    def _errors(self, name: str, terms: Terms) -> list[Term]:
+        """Return the errors of the readings of a channel."""
+        return [term for term in terms if term.is_data_error and term.target == name and term.kind != "stuck"]
+
+    def log_jacobian(self, terms: Terms) -> float:
+        """Return log |∂(record as it should be)/∂(record)|, which makes evidences of corrected records comparable; and
+        of stuck readings the log density: each is equal to the one before.
+        """
+        total = 0.0
+        for term in terms:
+            if not term.is_data_error or term.target not in self.channels:
+                continue
+            each = self.channels[term.target]
+            count = int((self._where(each, term) & each.used).sum())
+            if term.kind == "stuck":
+                total -= (count - 1) * np.log(max(each.prior.resolution, self.levels[term.target] * STEP))
+            else:
+                total -= count * np.log(abs(term.factor))
+        return float(total)
+
+    def used(self, name: str, terms: Terms) -> np.ndarray:
+        """Return which readings of a channel an explanation uses (m,)."""
+        each = self.channels[name]
+        stuck = [self._where(each, term) for term in terms if term.kind == "stuck" and term.target == name]
+        return each.used & ~np.any(stuck, axis=0) if stuck else each.used
+
+    def steps(self, entries: Sequence[Entry], x: np.ndarray) -> np.ndarray:
+        """Return the step of the sensitivity to each entry (n,), to the side that its bounds leave."""
+        sd = np.array([entry.sd for entry in entries])
+        high = np.array([entry.high for entry in entries])
+        return np.where(x + STEP * sd <= high, STEP * sd, -STEP * sd)
+
+    def jacobian(
+        self,
+        terms: Terms,
+        entries: Sequence[Entry],
+        x: np.ndarray,
+        wanted: Sequence[int] | None = None,
+        *,
+        must: bool = False,
+    ) -> dict[str, np.ndarray]:
+        """Return channel → −∂e/∂x (m, n) at x, of some entries or of all; 0 where neither side can be simulated.
+
+        Args:
+            terms: of the explanation.
+            entries: its free numbers.
+            x: the point (n,), which can be simulated.
+            wanted: places of some entries.
+            must: whether a model that cannot be simulated a small step away is refused.
+        """
+        places = np.arange(len(entries)) if wanted is None else np.asarray(wanted, dtype=int)
+        steps = self.steps(entries, x)[places]
+        columns, valid = self._columns(terms, entries, x, places, steps, must=must)
+        if not valid.all():
+            steps[~valid] *= -1.0
+            again, _ = self._columns(terms, entries, x, places[~valid], steps[~valid], must=False)
+            for name, column in again.items():
+                columns[name][:, ~valid] = np.nan_to_num(column)
+        return columns
+
+    def _columns(
+        self, terms: Terms, entries: Sequence[Entry], x: np.ndarray, places: np.ndarray, steps: np.ndarray, *, must: bool
+    ) -> tuple[dict[str, np.ndarray], np.ndarray]:
+        moved = np.repeat(x[None, :], places.size, axis=0)
+        moved[np.arange(places.size), places] += steps
+        found, valid = self.residuals(terms, entries, [x, *moved], must=must)
+        return {name: self._wrapped(name, e[:, :1] - e[:, 1:]) / steps for name, e in found.items()}, valid[1:]
+
+    def _wrapped(self, name: str, values: np.ndarray) -> np.ndarray:
+        turn = self.model.channels[name].turn
+        return values - turn * np.rint(values / turn) if turn else values
+
+    def _where(self, each: Readings, term: Term) -> np.ndarray:
+        of = np.ones(each.time.size, dtype=bool) if term.record < 0 else each.record == term.record
+        return of & (each.time >= term.begins) & (each.time <= term.ends)
+
+    def _ramp(self, each: Readings) -> np.ndarray:
+        """Return time as −½ at the beginning of each record and ½ at its end (m,)."""
+        start = np.array([record.time[0] for record in self.records])[each.record]
+        span = np.array([np.ptp(record.time) for record in self.records])[each.record]
+        return (each.time - start) / span - 0.5
+
+
+def _moves(entry: Entry, k: int) -> bool:
+    """Return whether an entry changes the simulation of record k."""
+    return entry.record in (-1, k) and (entry.kind not in CORRECTIONS or entry.name == INPUTS)
+
+
+def _input(record: Record, name: str) -> np.ndarray:
+    """Return an input of a record (n,), without gaps."""
+    if name not in record.columns:
+        raise UserError(f"{record.name}: there is no input {name!r}; it has {', '.join(record.columns) or 'nothing'}.")
+    values, at = record.columns[name], record.times_of(name)
+    known = np.isfinite(values)
+    if not known.any():
+        raise UserError(f"{record.name}: the input {name!r} has no value.")
+    return np.interp(record.time, at[known], values[known])
+
+
+def _spikes(values: np.ndarray, far: float, turn: float) -> np.ndarray:
+    """Return which readings (m,) are alone far from both neighbours, which agree."""
+    found = np.zeros(values.size, dtype=bool)
+    before, after = values[1:-1] - values[:-2], values[1:-1] - values[2:]
+    if turn:
+        before, after = before - turn * np.rint(before / turn), after - turn * np.rint(after / turn)
+    with np.errstate(invalid="ignore"):
+        apart = np.abs(before - after)
+        found[1:-1] = (np.minimum(np.abs(before), np.abs(after)) > far) & (before * after > 0.0)
+        found[1:-1] &= apart < 0.5 * np.minimum(np.abs(before), np.abs(after))
+    return found

@@ -1,0 +1,185 @@
+"""The search for explanations: ranked in the linear problem, the best fitted with simulations; add, drop, swap.
+
+It begins twice: at the nominal model, where gross errors in the data are plain whatever a fit would bend, and at the
+fit of "nothing is wrong".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from subzero.identification.candidates import declared, suggested
+from subzero.identification.explanation import Entry, Term, Terms, log_prior, with_term, without
+from subzero.identification.fit import Fit, Linear, fit, fitted_levels, linearised, usual_levels
+from subzero.identification.problem import Problem, Progress
+
+MOST_TERMS = 8
+"""An explanation has no more terms."""
+RANKED_AGAIN, FITTED = 10, 6
+"""So many of the best are ranked again with their own noise; at most so many of these are fitted."""
+WITHIN = 5.0
+"""Explanations within this of the best are expanded, too. [nats]"""
+WORTH = 1.0
+"""A term that is ranked to gain less is not fitted. [nats]"""
+MOST_FITS = 60
+"""The search ends after so many fits, and says so."""
+
+Key = tuple[tuple[str, float, float], ...]
+
+
+def key(terms: Terms) -> Key:
+    """Return what an explanation is: of terms that begin at some time, whatever that is."""
+    return tuple((term.id, term.factor if term.kind == "unit" else 1.0, term.offset if term.kind == "unit" else 0.0) for term in terms)
+
+
+@dataclass(eq=False)
+class Search:
+    """A search.
+
+    Attributes:
+        problem: records and model.
+        progress: told of every fit.
+        fits: explanation → its best fit.
+        complete: whether it came to its end.
+    """
+
+    problem: Problem
+    progress: Progress
+    fits: dict[Key, Fit] = field(default_factory=dict)
+    complete: bool = True
+
+    def __post_init__(self) -> None:
+        self._expanded: set[Key] = set()
+        self._tried: set[Key] = set()
+        self._terms = declared(self.problem)
+        self._loggers = {name: sensor.logger for name, sensor in self.problem.model.channels.items()}
+
+    def score(self, fitted: Fit) -> float:
+        """Return the log posterior probability of an explanation, up to a constant."""
+        return fitted.log_evidence + log_prior(fitted.terms, self._loggers)
+
+    def ranked(self) -> list[Fit]:
+        """Return all fits, the most probable first."""
+        return sorted(self.fits.values(), key=self.score, reverse=True)
+
+    def run(self) -> None:
+        """Search until no move gains."""
+        problem, levels = self.problem, usual_levels(self.problem)
+        entries = problem.entries(())
+        nominal = linearised(problem, (), entries, np.array([entry.centre for entry in entries]), levels, must=True)
+        chain = self._greedy(nominal)
+        self._fit((), nominal)
+        for linear in chain:
+            self._fit(linear.terms, linear)
+        while (base := self._next()) is not None:
+            if len(self.fits) >= MOST_FITS:
+                self.complete = False
+                return
+            self._expand(base)
+
+    def _next(self) -> Fit | None:
+        """Return the best explanation that was not expanded yet, if it is near the best of all."""
+        ranked = self.ranked()
+        best = self.score(ranked[0])
+        near = [each for each in ranked if self.score(each) > best - WITHIN]
+        return next((each for each in near if key(each.terms) not in self._expanded), None)
+
+    def _expand(self, base: Fit) -> None:
+        """Fit the best explanations that are one move away."""
+        self._expanded.add(key(base.terms))
+        for linear in self._best_additions(base.linear):
+            self._fit(linear.terms, linear)
+        for term in base.terms:
+            smaller = self._fit(without(base.terms, term), base.linear)
+            for linear in self._best_additions(smaller.linear):
+                self._fit(linear.terms, linear)
+
+    def _fit(self, terms: Terms, start: Linear) -> Fit:
+        """Return the fit of an explanation; it is fitted from each start only once."""
+        name = key(terms)
+        if name in self._tried:
+            return self.fits[name]
+        self._tried.add(name)
+        words = " + ".join(term.id for term in terms) or "nothing is wrong"
+        self.progress(min(0.9, 0.05 + 0.02 * len(self.fits)), f"fit of {words}")
+        values: dict[Entry, float] = dict(zip(start.entries, start.x.tolist(), strict=True))
+        fitted = fit(self.problem, terms, values, start.levels)
+        if name not in self.fits or fitted.log_evidence > self.fits[name].log_evidence:
+            self.fits[name] = fitted
+        return self.fits[name]
+
+    def _greedy(self, nominal: Linear) -> list[Linear]:
+        """Return explanations, each with the term more that gains most in the linear problem at the nominal model."""
+        chain: list[Linear] = []
+        here, before = nominal, self._linear_score(nominal)
+        while len(here.terms) < MOST_TERMS:
+            added = self._additions(here)
+            if not added or added[0][0] < before + WORTH:
+                break
+            before, here = added[0]
+            chain.append(here)
+        return chain
+
+    def _linear_score(self, linear: Linear) -> float:
+        return linear.evidence(self.problem)[1] + log_prior(linear.terms, self._loggers)
+
+    def _best_additions(self, base: Linear) -> list[Linear]:
+        """Return explanations with one term more, ranked with their own noise, that may be worth a fit."""
+        if len(base.terms) >= MOST_TERMS:
+            return []
+        here = self._linear_score(base)
+        again = []
+        for _, linear in self._distinct(self._additions(base))[:RANKED_AGAIN]:
+            own = replace(linear, levels=fitted_levels(self.problem, linear))
+            again.append((self._linear_score(own), own))
+        again.sort(key=lambda pair: -pair[0])
+        least = max(here - WORTH, again[0][0] - WITHIN) if again else here
+        return [linear for score, linear in again[:FITTED] if score > least]
+
+    def _distinct(self, ranked: Iterable[tuple[float, Linear]]) -> list[tuple[float, Linear]]:
+        found: dict[Key, tuple[float, Linear]] = {}
+        for score, linear in ranked:
+            found.setdefault(key(linear.terms), (score, linear))
+        return list(found.values())
+
+    def _additions(self, base: Linear) -> list[tuple[float, Linear]]:
+        """Return explanations with one term more, linearised, with their scores: the best first."""
+        present = {term.id for term in base.terms}
+        worth = [term for term in suggested(self.problem, base, self._terms) if term.id not in present]
+        found = [(self._linear_score(linear), linear) for term in worth for linear in self.added(base, term)]
+        return sorted(found, key=lambda pair: -pair[0])
+
+    def added(self, base: Linear, term: Term) -> Iterator[Linear]:
+        """Yield an explanation with a term more, if it can be simulated where the term begins."""
+        problem, terms = self.problem, with_term(base.terms, term)
+        entries = problem.entries(terms)
+        known = {entry.identity: (value, i) for i, (entry, value) in enumerate(zip(base.entries, base.x.tolist(), strict=True))}
+        new = [i for i, entry in enumerate(entries) if entry.identity not in known]
+        x = np.array(
+            [
+                known[entry.identity][0] if entry.identity in known else _begin(entry, term)
+                for entry in entries
+            ]
+        )
+        found, valid = problem.residuals(terms, entries, [x])
+        if not valid[0]:
+            return
+        own = problem.jacobian(terms, entries, x, new) if new else {}
+        J = {}
+        for name, old in base.J.items():
+            whole = np.empty((old.shape[0], len(entries)))
+            places = [known[entry.identity][1] for entry in entries if entry.identity in known]
+            whole[:, [i for i in range(len(entries)) if i not in set(new)]] = old[:, places]
+            if new:
+                whole[:, new] = own[name]
+            J[name] = whole
+        yield Linear(terms, entries, x, {name: e[:, 0] for name, e in found.items()}, J, base.levels)
+
+
+def _begin(entry: Entry, term: Term) -> float:
+    """Return where the search for a new number begins."""
+    away = term.size * entry.sd if entry.kind in ("cause", "delay") else 0.0
+    return float(np.clip(entry.centre + away, entry.low, entry.high))

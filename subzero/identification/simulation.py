@@ -1,0 +1,156 @@
+"""Runs of a model's function: checked, kept, in batches where the function can."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from subzero.identification.model import COMMAND, Model, ModelError
+
+KEPT = 2000
+"""So many runs are kept."""
+
+
+class Asked(NamedTuple):
+    """A run: numbers by name, causes' numbers included; unknown inputs at the times (n,); delay of the inputs [s]."""
+
+    numbers: Mapping[str, float]
+    unknown: Mapping[str, np.ndarray]
+    late: float = 0.0
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """What makes it another run."""
+        return (self.late, tuple(self.numbers.values()), *(values.tobytes() for values in self.unknown.values()))
+
+
+class Runs:
+    """Runs of a model with the inputs of one record at its times."""
+
+    def __init__(self, model: Model, time: np.ndarray, inputs: Mapping[str, np.ndarray], source: str) -> None:
+        self.model, self.time, self.inputs, self.source = model, time, inputs, source
+        self.count = 0
+        self._kept: OrderedDict[tuple[Any, ...], dict[str, np.ndarray] | None] = OrderedDict()
+
+    def readings(self, asked: Sequence[Asked], *, must: bool = False) -> list[dict[str, np.ndarray] | None]:
+        """Return channel → readings (n,) of each run; None of one that failed.
+
+        Args:
+            asked: the runs.
+            must: whether a run that fails is refused.
+
+        Raises:
+            ModelError: what the function returns cannot be used.
+        """
+        new = list({run.key: run for run in asked if run.key not in self._kept}.values())
+        for run, found in zip(new, self._computed(new), strict=True):
+            self._keep(run.key, found if all(np.isfinite(values).all() for values in found.values()) else None)
+            if must and self._kept[run.key] is None:
+                bad = [name for name, values in found.items() if not np.isfinite(values).all()]
+                at = int(np.argmax(~np.isfinite(found[bad[0]])))
+                raise ModelError(
+                    f"{self.source}: the model gives {found[bad[0]][at]} for {bad[0]} at {self.time[at]:g} s, with "
+                    f"{shown(run.numbers)}."
+                )
+        return [self._found(run) for run in asked]
+
+    def _found(self, run: Asked) -> dict[str, np.ndarray] | None:
+        if run.key not in self._kept:  # more were asked at once than are kept
+            return self.readings([run])[0]
+        self._kept.move_to_end(run.key)
+        return self._kept[run.key]
+
+    def _keep(self, key: tuple[Any, ...], found: dict[str, np.ndarray] | None) -> None:
+        self._kept[key] = found
+        while len(self._kept) > KEPT:
+            self._kept.popitem(last=False)
+
+    def _computed(self, runs: Sequence[Asked]) -> list[dict[str, np.ndarray]]:
+        self.count += len(runs)
+        if self.model.batch and runs:
+            return self._batch(runs)
+        return [self._checked(self._call(run.numbers, run.unknown, run, [run.late]), run, 0) for run in runs]
+
+    def _batch(self, runs: Sequence[Asked]) -> list[dict[str, np.ndarray]]:
+        numbers = {name: np.array([run.numbers[name] for run in runs]) for name in runs[0].numbers}
+        unknown = {name: np.stack([run.unknown[name] for run in runs], axis=1) for name in runs[0].unknown}
+        late = [run.late for run in runs]
+        found = self._call(numbers, unknown, runs[0], late if len(set(late)) > 1 else late[:1])
+        return [self._checked(found, run, len(runs), k) for k, run in enumerate(runs)]
+
+    def _delayed(self, values: np.ndarray, late: Sequence[float]) -> np.ndarray:
+        """Return an input with delays: (n,), or (n, delays) for a batch."""
+        shifted = [np.interp(self.time - each, self.time, values) if each else values for each in late]
+        return np.stack(shifted, axis=1) if self.model.batch else shifted[0]
+
+    def _call(
+        self, numbers: Mapping[str, Any], unknown: Mapping[str, Any], run: Asked, late: Sequence[float]
+    ) -> Mapping[str, Any]:
+        inputs: dict[str, Any] = {name: self._delayed(values, late) for name, values in self.inputs.items()}
+        for name, values in unknown.items():
+            of = name.removeprefix(COMMAND)
+            inputs[of] = inputs[of] + values if name.startswith(COMMAND) else values
+        try:
+            with np.errstate(all="ignore"):
+                return self.model.simulate(nested(numbers), inputs, self.time)
+        except Exception as error:
+            raise ModelError(
+                f"{self.source}: the model raises {type(error).__name__}: {error}, with {shown(run.numbers)}."
+            ) from error
+
+    def _checked(self, found: Mapping[str, Any], run: Asked, batch: int, k: int = 0) -> dict[str, np.ndarray]:
+        shape = (self.time.size, batch) if batch else (self.time.size,)
+        if not isinstance(found, Mapping):
+            raise ModelError(f"the model returns {type(found).__name__}; it must return {{channel: readings}}.")
+        readings = {}
+        for name in self.model.channels:
+            if name not in found:
+                raise ModelError(f"the model returns no {name!r}; it returns {', '.join(map(str, found)) or 'nothing'}.")
+            try:
+                values = np.asarray(found[name], dtype=float)
+            except (TypeError, ValueError):
+                raise ModelError(f"the model returns no numbers for {name!r}.") from None
+            if values.shape != shape:
+                raise ModelError(
+                    f"{self.source}: the model returns {values.shape} readings of {name!r} for {shape}, with "
+                    f"{shown(run.numbers)}."
+                )
+            readings[name] = values[:, k].copy() if batch else values.copy()
+        return readings
+
+    def check(self, run: Asked) -> None:
+        """Refuse a model that gives two answers to one question.
+
+        Raises:
+            ModelError: it does, or its answer cannot be used.
+        """
+        (first,) = self.readings([run], must=True)
+        self._kept.clear()
+        (second,) = self.readings([run], must=True)
+        assert first is not None and second is not None
+        for name in first:
+            if not np.array_equal(first[name], second[name]):
+                apart = float(np.max(np.abs(first[name] - second[name])))
+                raise ModelError(
+                    f"{self.source}: called twice with the same parameters, the model gives two answers, up to "
+                    f"{apart:.3g} apart in {name}. It depends on something that is no argument (a random number, a "
+                    "state that it keeps); make that an argument or remove it."
+                )
+
+
+def nested(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """Return numbers by name, with those of a cause also together: "overflow.lip" and ["overflow"]["lip"]."""
+    found = dict(numbers)
+    for name, value in numbers.items():
+        cause, dot, number = name.partition(".")
+        if dot:
+            found.setdefault(cause, {})[number] = value
+    return found
+
+
+def shown(numbers: Mapping[str, float]) -> str:
+    """Return numbers in words, for messages."""
+    return ", ".join(f"{name} = {value:.6g}" for name, value in numbers.items() if np.isfinite(value)) or "no parameter"
