@@ -146,6 +146,16 @@ def test_a_restored_state_goes_on_as_if_nothing_had_been(winch, properties):
     assert np.array_equal(tether.tension, tension)
 
 
+def test_a_restored_state_has_the_winch_of_its_time():
+    tether = made(winch=cable.PayOutRate(rate=0.2))
+    stepped(tether, 0, 5)
+    state, length = tether.save(), tether.length
+    tether.step(0.1, ends_at(0.6), cable.ConstantTension(tension=3.0))
+    tether.restore(state)
+    tether.step(0.1, ends_at(0.6))
+    assert tether.length == pytest.approx(length + 0.02)
+
+
 def test_saving_looking_and_attempts_leave_no_trace():
     tether, other = made(), made()
     for k in range(1, 11):
