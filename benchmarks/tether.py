@@ -113,7 +113,7 @@ def counting_gain() -> float:
 def show_threads(repeats: int) -> None:
     gain = statistics.median(counting_gain() for _ in range(repeats))
     print(
-        f"\n{TETHERS} tethers, 20 steps each, on {os.cpu_count()} cores; a loop that counts: {gain:.2f} times one thread"
+        f"\n{TETHERS} tethers, 20 steps each, {os.cpu_count()} cores; a loop that counts: {gain:.2f} times one thread"
     )
     for segments in (50, 100, 300):
         ratios, busy, ends = [], [], [ends_at(STEP_S * k) for k in range(1, 21)]
@@ -180,7 +180,7 @@ def show_step_sizes() -> None:
     fine = driven(0.01, 1e-4)
     largest = np.linalg.norm(fine, axis=2).max()
     print(
-        f"\nhost step [s]   largest difference of a force, as a share of the largest force ({largest:.2f} N)"
+        f"\nhost step [s]   largest and median difference of a force, as shares of the largest ({largest:.2f} N)"
     )
     for dt in (0.01, 0.1, 0.5):
         every = round(dt / 0.01)
