@@ -53,11 +53,20 @@ SCRIPT = '''"""A tether, made by subzero export-fmu."""
 
 from subzero.fmu import TetherSlave
 
+# The loader (pythonfmu 0.7) gives up one reference too many to the names of this module for each unit that it makes,
+# and Python would crash when it ends: here is one more for each.
+KEPT = []
+
 
 class {name}(TetherSlave):
     """The tether, with the numbers that it was exported with."""
 
     start = {start!r}
+
+    def __init__(self, **given):
+        """Begin."""
+        KEPT.append(globals())
+        super().__init__(**given)
 '''
 
 
