@@ -362,6 +362,12 @@ class Tether:
             f" {pulls}"
         )
 
+    def __reduce__(self) -> Any:
+        """Refuse to be copied: compiled code holds the memory of this one."""
+        raise TetherError(
+            "A tether can be neither copied nor sent to another process. Make another one there."
+        )
+
     def _take(self, stepped: Stepped) -> None:
         """Keep the arrays, and the forces in them."""
         self._stepped, self._line = stepped, stepped.line

@@ -227,7 +227,7 @@ def export_fmu(
     with tempfile.TemporaryDirectory() as folder:
         script = Path(folder) / f"{name.lower()}_exported.py"
         script.write_text(SCRIPT.format(name=name, start=start), encoding="utf-8")
-        states = {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True}
+        states: dict[str, Any] = {"canGetAndSetFMUstate": True, "canSerializeFMUstate": True}
         FmuBuilder.build_FMU(script, dest=path, **states)
     return path
 

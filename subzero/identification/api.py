@@ -1,6 +1,6 @@
 """`diagnose`: from records and a model to a verdict.
 
-    problem → search → nearness → locks → verdict
+problem → search → nearness → locks → verdict
 """
 
 from __future__ import annotations
@@ -91,7 +91,9 @@ def _concluded(search: Search, held_out: Sequence[Record]) -> Verdict:
         for term in best.terms
         if term.kind != "tolerances"
     ]
-    named = tuple(each for each in terms if near.near and not each.against and each.probability >= NAMED_PROBABILITY)
+    named = tuple(
+        each for each in terms if near.near and not each.against and each.probability >= NAMED_PROBABILITY
+    )
     suspected = tuple(each for each in terms if each not in named)
     budget = _budget(search, best)
     return Verdict(
@@ -144,7 +146,15 @@ def _named(
 ) -> Named:
     against = lock.reasons if lock else ("the model is not near",) if not near.near else ()
     gain = lock.gain if lock else None
-    return Named(term.id, term.sentence, term.is_data_error, probability, _estimates(problem, best, term), gain, against)
+    return Named(
+        term.id,
+        term.sentence,
+        term.is_data_error,
+        probability,
+        _estimates(problem, best, term),
+        gain,
+        against,
+    )
 
 
 def _estimates(problem: Problem, best: Fit, term: Term) -> tuple[Estimate, ...]:
@@ -196,11 +206,17 @@ def _relations(problem: Problem, ranked: Sequence[Fit], probabilities: np.ndarra
         clock = _contrast(ranked, probabilities, a, b, "delay")
         said = []
         if ratio is not None:
-            said.append(f"by a factor {math.exp(ratio[0]):.3f} ± {math.exp(ratio[0]) * ratio[1]:.2g} ({b} over {a})")
+            said.append(
+                f"by a factor {math.exp(ratio[0]):.3f} ± {math.exp(ratio[0]) * ratio[1]:.2g} ({b} over {a})"
+            )
         if clock is not None:
-            said.append(f"their clocks by {abs(clock[0]):.2f} ± {clock[1]:.2g} s ({b if clock[0] > 0 else a} is later)")
+            said.append(
+                f"their clocks by {abs(clock[0]):.2f} ± {clock[1]:.2g} s ({b if clock[0] > 0 else a} is later)"
+            )
         if said and not _decided(ranked, probabilities, (a, b)):
-            found.append(f"{a} and {b} differ {', and '.join(said)}. Which of them is wrong these records cannot tell.")
+            found.append(
+                f"{a} and {b} differ {', and '.join(said)}. Which of them is wrong these records cannot tell."
+            )
     return found
 
 
@@ -223,7 +239,9 @@ def _contrast(
     for each in ranked:
         mean = variance = 0.0
         for channel, sign in ((b, 1.0), (a, -1.0)):
-            factor = [term.factor for term in each.terms if term.target == channel and term.slot[0] == "y = a + b x"]
+            factor = [
+                term.factor for term in each.terms if term.target == channel and term.slot[0] == "y = a + b x"
+            ]
             mean += sign * sum(math.log(abs(f)) for f in factor) if kind == "gain" else 0.0
             for entry, value, own in zip(each.entries, each.x.tolist(), each.variance.tolist(), strict=True):
                 if entry.kind == kind and entry.name == channel:
@@ -250,7 +268,9 @@ def _budget(search: Search, best: Fit) -> tuple[Share, ...]:
     before = left(here)
     remaining = list(best.terms)
     while remaining:
-        after, term = min(((left(with_term(here, each)), each) for each in remaining), key=lambda pair: pair[0])
+        after, term = min(
+            ((left(with_term(here, each)), each) for each in remaining), key=lambda pair: pair[0]
+        )
         shares.append(Share(term.id, before, after))
         here, before = with_term(here, term), after
         remaining.remove(term)
@@ -265,7 +285,11 @@ def _remainder(problem: Problem, best: Fit, near: Nearness) -> str:
     rows = []
     for k, record in enumerate(problem.records):
         values = np.array(
-            [v for e, v in zip(best.entries, best.x.tolist(), strict=True) if e.identity[:3] == ("unknown", name, k)]
+            [
+                v
+                for e, v in zip(best.entries, best.x.tolist(), strict=True)
+                if e.identity[:3] == ("unknown", name, k)
+            ]
         )
         rows.append((record, np.abs(np.interp(record.time, problem.knots[k][name], values))))
     size = np.concatenate([row for _, row in rows])
@@ -276,7 +300,11 @@ def _remainder(problem: Problem, best: Fit, near: Nearness) -> str:
         if np.std(column) > 0.0 and np.std(size) > 0.0
     ]
     strongest = max(grows, key=lambda pair: abs(pair[0]), default=(0.0, ""))
-    words = f", and {'grows' if strongest[0] > 0 else 'falls'} with {strongest[1]}" if abs(strongest[0]) > 0.5 else ""
+    words = (
+        f", and {'grows' if strongest[0] > 0 else 'falls'} with {strongest[1]}"
+        if abs(strongest[0]) > 0.5
+        else ""
+    )
     return f"What stays acts on {name}{words}."
 
 
@@ -313,7 +341,11 @@ def _sizes(problem: Problem, linear: object, term: Term) -> list[tuple[str, floa
     cause = next((cause for cause in problem.model.causes if cause.id == term.target), None)
     found = []
     for i, entry in enumerate(linear.entries):
-        mine = entry.name == term.target if term.is_data_error else bool(cause) and entry.name in (cause.changes if cause else ())
+        mine = (
+            entry.name == term.target
+            if term.is_data_error
+            else bool(cause) and entry.name in (cause.changes if cause else ())
+        )
         if not mine:
             continue
         data = 1.0 / max(1.0 / variance[i] - 1.0 / sd[i] ** 2, 1e-300)
@@ -329,11 +361,15 @@ def _notes(problem: Problem, search: Search) -> tuple[str, ...]:
     for name, each in problem.channels.items():
         spikes = int((np.isfinite(each.values) & ~each.used).sum())
         if spikes:
-            found.append(f"{name}: {spikes} readings are set aside: outside the record's time, or alone far from both neighbours.")
+            found.append(
+                f"{name}: {spikes} readings are set aside: outside the record's time, or alone far from both neighbours."
+            )
         if not each.prior.declared:
             found.append(f"{name}: the noise of its sensor, {each.prior.level:.2g}, was read off the record.")
     if not search.complete:
-        found.append("The search was ended after its largest number of fits; there may be better explanations.")
+        found.append(
+            "The search was ended after its largest number of fits; there may be better explanations."
+        )
     return tuple(found)
 
 

@@ -111,7 +111,9 @@ def _regression(problem: Problem, name: str, simulated: np.ndarray, used: np.nda
         return None
     a = float(np.mean(y - b * h))
     odds = 0.1 * data_odds(problem)
-    return Term(f"affine:{name}", f"{name} has another scale and zero", "affine", name, odds, factor=b, offset=a)
+    return Term(
+        f"affine:{name}", f"{name} has another scale and zero", "affine", name, odds, factor=b, offset=a
+    )
 
 
 def data_odds(problem: Problem) -> float:
@@ -120,7 +122,13 @@ def data_odds(problem: Problem) -> float:
 
 
 def _from_some_time(
-    each: Readings, term: Term, e: np.ndarray, simulated: np.ndarray, used: np.ndarray, level: float, turn: float
+    each: Readings,
+    term: Term,
+    e: np.ndarray,
+    simulated: np.ndarray,
+    used: np.ndarray,
+    level: float,
+    turn: float,
 ) -> Iterator[Term]:
     """Yield an error from the time on that fits best in each record, if there is one."""
     for record in np.unique(each.record).tolist():
@@ -159,4 +167,6 @@ def _stuck(problem: Problem, name: str, simulated: np.ndarray) -> Iterator[Term]
         start, end = float(each.time[at[first]]), float(each.time[at[last]])
         sentence = f"{name} is stuck from {start:.4g} to {end:.4g} s"
         odds = data_odds(problem) / at.size
-        yield Term(f"stuck:{name}@{record}", sentence, "stuck", name, odds, begins=start, ends=end, record=record)
+        yield Term(
+            f"stuck:{name}@{record}", sentence, "stuck", name, odds, begins=start, ends=end, record=record
+        )

@@ -201,7 +201,13 @@ def cause_terms(model: Model, duration: float) -> list[Term]:
 
 def tolerance_term(model: Model) -> Term:
     """Return the term of wider tolerances."""
-    return Term("tolerances", "the parameters are farther off than their tolerances say", "tolerances", "", PRIOR_TOLERANCES)
+    return Term(
+        "tolerances",
+        "the parameters are farther off than their tolerances say",
+        "tolerances",
+        "",
+        PRIOR_TOLERANCES,
+    )
 
 
 def data_terms(model: Model) -> list[Term]:
@@ -211,12 +217,29 @@ def data_terms(model: Model) -> list[Term]:
     odds = PRIOR_DATA
     for name in suspects:
         sensor = model.channels[name]
-        known = [(f, sensor.turn * turns, words) for f, turns, words in (*KNOWN, *(KNOWN_ANGLES if sensor.angle else ()))]
-        soft = [("offset", "has an offset"), ("scale", "has an error of scale"), ("affine", "has another scale and zero")]
+        known = [
+            (f, sensor.turn * turns, words)
+            for f, turns, words in (*KNOWN, *(KNOWN_ANGLES if sensor.angle else ()))
+        ]
+        soft = [
+            ("offset", "has an offset"),
+            ("scale", "has an error of scale"),
+            ("affine", "has another scale and zero"),
+        ]
         soft += [("drift", "drifts"), ("delay", "is late or early")]
-        found += [Term(f"{kind}:{name}", f"{name} {words}", kind, name, odds / len(soft)) for kind, words in soft]
         found += [
-            Term(f"unit:{name}", f"{name}: {words}", "unit", name, odds / len(known), factor=factor, offset=offset)
+            Term(f"{kind}:{name}", f"{name} {words}", kind, name, odds / len(soft)) for kind, words in soft
+        ]
+        found += [
+            Term(
+                f"unit:{name}",
+                f"{name}: {words}",
+                "unit",
+                name,
+                odds / len(known),
+                factor=factor,
+                offset=offset,
+            )
             for factor, offset, words in known
         ]
     if model.inputs:
@@ -236,7 +259,9 @@ def from_time(term: Term, record: int, time: float, share: float) -> Term:
     )
 
 
-def entries_of(terms: Terms, model: Model, levels: dict[str, float], intervals: dict[str, float]) -> list[Entry]:
+def entries_of(
+    terms: Terms, model: Model, levels: dict[str, float], intervals: dict[str, float]
+) -> list[Entry]:
     """Return the free numbers that terms bring, and those of the model with the prior that the terms leave them.
 
     Args:
@@ -246,7 +271,15 @@ def entries_of(terms: Terms, model: Model, levels: dict[str, float], intervals: 
         intervals: channel → its sampling interval. [s]
     """
     found = [
-        Entry("number", number.name, number.nominal, _spread(number.name, number.tolerance, terms, model), -1, number.low, number.high)
+        Entry(
+            "number",
+            number.name,
+            number.nominal,
+            _spread(number.name, number.tolerance, terms, model),
+            -1,
+            number.low,
+            number.high,
+        )
         for number in model.shared
     ]
     causes = {cause.id: cause for cause in model.causes}
@@ -266,7 +299,11 @@ def _spread(name: str, tolerance: float, terms: Sequence[Term], model: Model) ->
         variance *= WIDER**2
     if any(not model.channels[channel].trusted for channel in model.tuned_on.get(name, ())):
         variance *= TUNED_WIDER**2
-    variance += sum(causes[term.target].changes.get(name, 0.0) ** 2 for term in terms if term.kind == "cause" and math.isinf(term.begins))
+    variance += sum(
+        causes[term.target].changes.get(name, 0.0) ** 2
+        for term in terms
+        if term.kind == "cause" and math.isinf(term.begins)
+    )
     return math.sqrt(variance)
 
 
@@ -277,7 +314,9 @@ def _of_cause(cause: Cause, term: Term) -> list[Entry]:
     ]
     if math.isfinite(term.begins):
         found += [Entry("change", f"{cause.id}.{name}", 0.0, size) for name, size in cause.changes.items()]
-        found.append(Entry("since", cause.id, term.begins, term.ends / math.sqrt(2.0 * math.pi), -1, 0.0, term.ends))
+        found.append(
+            Entry("since", cause.id, term.begins, term.ends / math.sqrt(2.0 * math.pi), -1, 0.0, term.ends)
+        )
     return found
 
 

@@ -103,7 +103,9 @@ def _blocks(problem: Problem, name: str, terms: Terms, J: np.ndarray, e: np.ndar
 
 def spreads(entries: Sequence[Entry], levels: Levels) -> np.ndarray:
     """Return prior standard deviations (n,)."""
-    return np.array([entry.sd * (levels.sizes[entry.name] if entry.kind == "unknown" else 1.0) for entry in entries])
+    return np.array(
+        [entry.sd * (levels.sizes[entry.name] if entry.kind == "unknown" else 1.0) for entry in entries]
+    )
 
 
 def solve(
@@ -134,8 +136,7 @@ def log_levels(problem: Problem, levels: Levels) -> float:
     """Return the log prior density of noise and sizes, up to a constant."""
     noise = sum(problem.channels[name].prior.log_density(each) for name, each in levels.noise.items())
     sizes = sum(
-        -0.5 * (np.log(levels.sizes[unknown.name]) / SIZE_SPREAD) ** 2
-        for unknown in problem.model.unknown
+        -0.5 * (np.log(levels.sizes[unknown.name]) / SIZE_SPREAD) ** 2 for unknown in problem.model.unknown
     )
     return float(noise + sizes)
 
@@ -201,7 +202,9 @@ def _best_size(levels: Levels, name: str, negative: Callable[[Levels], float]) -
     def at(log: float) -> Levels:
         return replace(levels, sizes={**levels.sizes, name: float(np.exp(log))})
 
-    found = minimize_scalar(lambda log: negative(at(log)), bounds=SIZE_RANGE, method="bounded", options={"xatol": 0.05})
+    found = minimize_scalar(
+        lambda log: negative(at(log)), bounds=SIZE_RANGE, method="bounded", options={"xatol": 0.05}
+    )
     return at(float(found.x))
 
 
@@ -296,7 +299,8 @@ def free_fit(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> Fi
     for _ in range(ROUNDS):
         before = _left(free, linear)
         noise = {
-            name: replace(each, white=max(each.white, before[name])) for name, each in linear.levels.noise.items()
+            name: replace(each, white=max(each.white, before[name]))
+            for name, each in linear.levels.noise.items()
         }
         there = _stepped(free, replace(linear, levels=Levels(noise, linear.levels.sizes)))
         linear = linearised(free, terms, entries, there.x, linear.levels)
@@ -309,7 +313,8 @@ def free_fit(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> Fi
 def _left(problem: Problem, linear: Linear) -> dict[str, float]:
     """Return channel → root mean square of what is left."""
     return {
-        name: float(np.sqrt(np.mean(e[problem.used(name, linear.terms)] ** 2))) for name, e in linear.e.items()
+        name: float(np.sqrt(np.mean(e[problem.used(name, linear.terms)] ** 2)))
+        for name, e in linear.e.items()
     }
 
 
@@ -322,7 +327,8 @@ def _approached(problem: Problem, linear: Linear) -> Linear:
     for _ in range(ROUNDS):
         left = _left(problem, linear)
         tempered = {
-            name: replace(each, white=max(each.white, TEMPER * left[name])) for name, each in linear.levels.noise.items()
+            name: replace(each, white=max(each.white, TEMPER * left[name]))
+            for name, each in linear.levels.noise.items()
         }
         if tempered == linear.levels.noise:
             return linear
@@ -392,7 +398,9 @@ def _laplace(problem: Problem, linear: Linear) -> tuple[float, np.ndarray]:
     sd = spreads(linear.entries, linear.levels)
     factor = solve(products, sd, linear.off)[2]
     log_det = float(np.sum(np.log(np.diag(factor[0]))))
-    evidence = -_negative_log_posterior(problem, linear) - log_det - products[3] + log_levels(problem, linear.levels)
+    evidence = (
+        -_negative_log_posterior(problem, linear) - log_det - products[3] + log_levels(problem, linear.levels)
+    )
     return evidence, sd**2 * np.diag(cho_solve(factor, np.eye(sd.size)))
 
 

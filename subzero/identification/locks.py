@@ -65,7 +65,9 @@ class Locks:
 
 def locks(problem: Problem, best: Fit, held_out: Sequence[Record]) -> dict[str, Locks]:
     """Return the locks of every term of the best explanation: id → locks."""
-    return {term.id: _locks(problem, best, term, held_out) for term in best.terms if term.kind != "tolerances"}
+    return {
+        term.id: _locks(problem, best, term, held_out) for term in best.terms if term.kind != "tolerances"
+    }
 
 
 def _locks(problem: Problem, best: Fit, term: Term, held_out: Sequence[Record]) -> Locks:
@@ -107,7 +109,11 @@ def held_out_gain(problem: Problem, best: Fit, term: Term, held_out: Sequence[Re
     else:
         (record,) = problem.records
         split = float(record.time[0] + FITTED_SHARE * np.ptp(record.time))
-        if (math.isfinite(term.begins) and term.kind == "cause") or term.begins > split or term.kind == "stuck":
+        if (
+            (math.isfinite(term.begins) and term.kind == "cause")
+            or term.begins > split
+            or term.kind == "stuck"
+        ):
             return None
         folds = [([record.between(-math.inf, split)], [record], split)]
         what = "the last part of the record by a fit of the first"
@@ -146,7 +152,11 @@ def _gain(having: Sequence[np.ndarray], lacking: Sequence[np.ndarray], what: str
     better = np.concatenate([b - a for a, b in zip(having, lacking, strict=True)])
     blocks = np.array([np.mean(part) for part in np.array_split(better, min(BLOCKS, better.size))])
     draws = np.random.default_rng(0).integers(0, blocks.size, (DRAWS, blocks.size))
-    low = float(np.quantile(blocks[draws].mean(axis=1), SURE)) if np.isfinite(blocks).all() else _sign(having, lacking)
+    low = (
+        float(np.quantile(blocks[draws].mean(axis=1), SURE))
+        if np.isfinite(blocks).all()
+        else _sign(having, lacking)
+    )
     before, after = (float(np.sqrt(np.mean(np.concatenate(rows)))) for rows in (lacking, having))
     return Gain(before, after, low, what)
 

@@ -1,12 +1,12 @@
 """A model as a value: a function, and what is known of its channels, parameters, causes and unknown inputs.
 
-    def spring(p, u, t):
-        ...                                    # any code; returns {channel: values at t}
+def spring(p, u, t):
+    ...                                    # any code; returns {channel: values at t}
 
-    model = Model(spring, channels={"place": Sensor(noise=0.01, unit="m")}, inputs=["force"],
-        parameters=[Number("stiffness", 4.0, tolerance=0.05), Start("place0", 0.0, tolerance=0.1)],
-        causes=[Cause("soft", "the spring has another stiffness", changes={"stiffness": 1.0})],
-        unknown=[Unknown("command:force", size=0.02, time=0.5)])
+model = Model(spring, channels={"place": Sensor(noise=0.01, unit="m")}, inputs=["force"],
+    parameters=[Number("stiffness", 4.0, tolerance=0.05), Start("place0", 0.0, tolerance=0.1)],
+    causes=[Cause("soft", "the spring has another stiffness", changes={"stiffness": 1.0})],
+    unknown=[Unknown("command:force", size=0.02, time=0.5)])
 """
 
 from __future__ import annotations
@@ -79,7 +79,9 @@ class Number:
         self.nominal = finite(f"the nominal value of {what}", nominal)  # type: ignore[arg-type]
         spread = tolerance if tolerance is not None else scale
         if spread is None:
-            raise ModelError(f"{what} has neither tolerance nor scale; give the standard deviation of its error.")
+            raise ModelError(
+                f"{what} has neither tolerance nor scale; give the standard deviation of its error."
+            )
         self.tolerance = positive(f"the tolerance of {what}", spread)
         self.low, self.high = float(low), float(high)
         if not self.low <= self.nominal <= self.high:
@@ -176,7 +178,9 @@ class Cause:
         }
         self.numbers, self.off = dict(numbers), dict(off or {})
         if not self.changes and not self.numbers:
-            raise ModelError(f"the cause {id!r} changes nothing: give changes={{parameter: size}}, or its numbers.")
+            raise ModelError(
+                f"the cause {id!r} changes nothing: give changes={{parameter: size}}, or its numbers."
+            )
         unknown = [name for name in self.off if name not in self.numbers]
         if unknown or (self.numbers and not self.off):
             have = ", ".join(self.numbers)
@@ -184,7 +188,6 @@ class Cause:
                 f"the cause {id!r}: off={self.off} must give one or more of its numbers ({have}) the value for which "
                 "it does nothing."
             )
-
 
     @property
     def is_effect(self) -> bool:
@@ -240,7 +243,9 @@ class Model:
 
     def __post_init__(self) -> None:
         if not callable(self.simulate):
-            raise ModelError(f"simulate is {self.simulate!r}; it must be a function of parameters, inputs and times.")
+            raise ModelError(
+                f"simulate is {self.simulate!r}; it must be a function of parameters, inputs and times."
+            )
         if not self.channels:
             raise ModelError("the model has no channel: give channels={name: Sensor(...)}.")
         names = [number.name for number in self.parameters]
@@ -256,7 +261,9 @@ class Model:
             _known("tuned_on names the channel", channels, list(self.channels))
         for unknown in self.unknown:
             if unknown.name.startswith(COMMAND):
-                _known("an unknown input is added to", [unknown.name.removeprefix(COMMAND)], list(self.inputs))
+                _known(
+                    "an unknown input is added to", [unknown.name.removeprefix(COMMAND)], list(self.inputs)
+                )
 
     @property
     def shared(self) -> list[Number]:

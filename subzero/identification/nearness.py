@@ -76,7 +76,8 @@ def nearness(problem: Problem, fitted: Fit, free: Fit) -> Nearness:
     """Return how near an explanation is, given its fit, and that in free simulation."""
     left = left_by(problem, fitted, free)
     sizes = {
-        unknown.name: (fitted.linear.levels.sizes[unknown.name] * unknown.size, unknown.size) for unknown in problem.model.unknown
+        unknown.name: (fitted.linear.levels.sizes[unknown.name] * unknown.size, unknown.size)
+        for unknown in problem.model.unknown
     }
     bends = _bends(problem, fitted)
     reasons = [
@@ -121,10 +122,16 @@ def rms(values: np.ndarray) -> float:
 def _bends(problem: Problem, fitted: Fit) -> dict[str, float]:
     """Return how far parameters that no term names are from their nominal values, in tolerances."""
     tolerance = {number.name: number.tolerance for number in problem.model.shared}
-    named = {name for cause in problem.model.causes for name in cause.changes if cause.id in {t.target for t in fitted.terms}}
+    named = {
+        name
+        for cause in problem.model.causes
+        for name in cause.changes
+        if cause.id in {t.target for t in fitted.terms}
+    }
     calibrated = any(term.kind == "tolerances" for term in fitted.terms)
     found = {
-        entry.name: abs(value - entry.centre) / (entry.sd if calibrated or entry.name in problem.model.tuned_on else tolerance[entry.name])
+        entry.name: abs(value - entry.centre)
+        / (entry.sd if calibrated or entry.name in problem.model.tuned_on else tolerance[entry.name])
         for entry, value in zip(fitted.entries, fitted.x.tolist(), strict=True)
         if entry.kind == "number" and entry.name not in named
     }

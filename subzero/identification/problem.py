@@ -80,7 +80,9 @@ class Problem:
             Runs(model, record.time, inputs, record.name)
             for record, inputs in zip(self.records, self.inputs, strict=True)
         ]
-        self.channels = {name: found for name in model.channels if (found := self._readings(name)) is not None}
+        self.channels = {
+            name: found for name in model.channels if (found := self._readings(name)) is not None
+        }
         if not self.channels:
             have = ", ".join(self.records[0].columns) or "nothing"
             raise UserError(
@@ -247,7 +249,11 @@ class Problem:
     ) -> np.ndarray:
         """Return what a sensor with free errors shows of simulated readings h: a + (1 + g) h + d τ (m,)."""
         each = self.channels[name]
-        free = {entry.kind: x[i] for i, entry in enumerate(entries) if entry.name == name and entry.kind in CORRECTIONS}
+        free = {
+            entry.kind: x[i]
+            for i, entry in enumerate(entries)
+            if entry.name == name and entry.kind in CORRECTIONS
+        }
         values = simulated.copy()
         for term in self._errors(name, terms):
             at = self._where(each, term)
@@ -318,12 +324,21 @@ class Problem:
         return columns
 
     def _columns(
-        self, terms: Terms, entries: Sequence[Entry], x: np.ndarray, places: np.ndarray, steps: np.ndarray, *, must: bool
+        self,
+        terms: Terms,
+        entries: Sequence[Entry],
+        x: np.ndarray,
+        places: np.ndarray,
+        steps: np.ndarray,
+        *,
+        must: bool,
     ) -> tuple[dict[str, np.ndarray], np.ndarray]:
         moved = np.repeat(x[None, :], places.size, axis=0)
         moved[np.arange(places.size), places] += steps
         found, valid = self.residuals(terms, entries, [x, *moved], must=must)
-        return {name: self._wrapped(name, e[:, :1] - e[:, 1:]) / steps for name, e in found.items()}, valid[1:]
+        return {name: self._wrapped(name, e[:, :1] - e[:, 1:]) / steps for name, e in found.items()}, valid[
+            1:
+        ]
 
     def _wrapped(self, name: str, values: np.ndarray) -> np.ndarray:
         turn = self.model.channels[name].turn
@@ -348,7 +363,9 @@ def _moves(entry: Entry, k: int) -> bool:
 def _input(record: Record, name: str) -> np.ndarray:
     """Return an input of a record (n,), without gaps."""
     if name not in record.columns:
-        raise UserError(f"{record.name}: there is no input {name!r}; it has {', '.join(record.columns) or 'nothing'}.")
+        raise UserError(
+            f"{record.name}: there is no input {name!r}; it has {', '.join(record.columns) or 'nothing'}."
+        )
     values, at = record.columns[name], record.times_of(name)
     known = np.isfinite(values)
     if not known.any():

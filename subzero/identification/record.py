@@ -1,7 +1,7 @@
 """A record: columns of readings and inputs at their times, from memory or from a table with a header.
 
-    read("tanks.csv", time="4 s", level="yEst", pump="uEst")       # every 4 s
-    read("dive.csv.gz", time="elapsed", depth="eng_depth")         # times in a column [s]
+read("tanks.csv", time="4 s", level="yEst", pump="uEst")       # every 4 s
+read("dive.csv.gz", time="elapsed", depth="eng_depth")         # times in a column [s]
 """
 
 from __future__ import annotations
@@ -39,7 +39,9 @@ class Record:
     def __post_init__(self) -> None:
         object.__setattr__(self, "time", _ascending(self.time, f"{self.name}: time"))
         columns = {name: _numbers(values, f"{self.name}: {name}") for name, values in self.columns.items()}
-        times = {name: _ascending(values, f"{self.name}: times of {name}") for name, values in self.times.items()}
+        times = {
+            name: _ascending(values, f"{self.name}: times of {name}") for name, values in self.times.items()
+        }
         object.__setattr__(self, "columns", columns)
         object.__setattr__(self, "times", times)
         for name, values in columns.items():
@@ -111,13 +113,17 @@ def _table(path: Path) -> dict[str, list[str]]:
     try:
         raw = path.read_bytes()
     except OSError as error:
-        raise UserError(f"{path}: {error.strerror or error}. Give the path of a table with a header.") from None
+        raise UserError(
+            f"{path}: {error.strerror or error}. Give the path of a table with a header."
+        ) from None
     text = (gzip.decompress(raw) if raw[:2] == b"\x1f\x8b" else raw).decode("utf-8-sig", errors="replace")
     rows = [row for row in csv.reader(io.StringIO(text)) if any(cell.strip() for cell in row)]
     if len(rows) < 2:
         raise UserError(f"{path}: there are {len(rows)} rows; a table needs a header and values.")
     header = [cell.strip() for cell in rows[0]]
-    return {name: [row[k] if k < len(row) else "" for row in rows[1:]] for k, name in enumerate(header) if name}
+    return {
+        name: [row[k] if k < len(row) else "" for row in rows[1:]] for k, name in enumerate(header) if name
+    }
 
 
 def _column(table: Mapping[str, list[str]], name: str, path: str) -> np.ndarray:
@@ -148,5 +154,7 @@ def _ascending(values: Any, what: str) -> np.ndarray:
         raise UserError(f"{what} has {found.size} values; two or more are needed.")
     if not np.isfinite(found).all() or not (np.diff(found) > 0.0).all():
         at = int(np.argmax(~(np.diff(found) > 0.0)))
-        raise UserError(f"{what} does not rise from row {at} to {at + 1}: {found[at]:g}, {found[at + 1]:g}. Sort it.")
+        raise UserError(
+            f"{what} does not rise from row {at} to {at + 1}: {found[at]:g}, {found[at + 1]:g}. Sort it."
+        )
     return found

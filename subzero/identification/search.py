@@ -32,7 +32,10 @@ Key = tuple[tuple[str, float, float], ...]
 
 def key(terms: Terms) -> Key:
     """Return what an explanation is: of terms that begin at some time, whatever that is."""
-    return tuple((term.id, term.factor if term.kind == "unit" else 1.0, term.offset if term.kind == "unit" else 0.0) for term in terms)
+    return tuple(
+        (term.id, term.factor if term.kind == "unit" else 1.0, term.offset if term.kind == "unit" else 0.0)
+        for term in terms
+    )
 
 
 @dataclass(eq=False)
@@ -69,7 +72,9 @@ class Search:
         """Search until no move gains."""
         problem, levels = self.problem, usual_levels(self.problem)
         entries = problem.entries(())
-        nominal = linearised(problem, (), entries, np.array([entry.centre for entry in entries]), levels, must=True)
+        nominal = linearised(
+            problem, (), entries, np.array([entry.centre for entry in entries]), levels, must=True
+        )
         chain = self._greedy(nominal)
         self._fit((), nominal)
         for linear in chain:
@@ -156,7 +161,10 @@ class Search:
         """Yield an explanation with a term more, if it can be simulated where the term begins."""
         problem, terms = self.problem, with_term(base.terms, term)
         entries = problem.entries(terms)
-        known = {entry.identity: (value, i) for i, (entry, value) in enumerate(zip(base.entries, base.x.tolist(), strict=True))}
+        known = {
+            entry.identity: (value, i)
+            for i, (entry, value) in enumerate(zip(base.entries, base.x.tolist(), strict=True))
+        }
         new = [i for i, entry in enumerate(entries) if entry.identity not in known]
         x = np.array(
             [

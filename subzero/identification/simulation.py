@@ -24,7 +24,11 @@ class Asked(NamedTuple):
     @property
     def key(self) -> tuple[Any, ...]:
         """What makes it another run."""
-        return (self.late, tuple(self.numbers.values()), *(values.tobytes() for values in self.unknown.values()))
+        return (
+            self.late,
+            tuple(self.numbers.values()),
+            *(values.tobytes() for values in self.unknown.values()),
+        )
 
 
 class Runs:
@@ -47,7 +51,9 @@ class Runs:
         """
         new = list({run.key: run for run in asked if run.key not in self._kept}.values())
         for run, found in zip(new, self._computed(new), strict=True):
-            self._keep(run.key, found if all(np.isfinite(values).all() for values in found.values()) else None)
+            self._keep(
+                run.key, found if all(np.isfinite(values).all() for values in found.values()) else None
+            )
             if must and self._kept[run.key] is None:
                 bad = [name for name, values in found.items() if not np.isfinite(values).all()]
                 at = int(np.argmax(~np.isfinite(found[bad[0]])))
@@ -104,11 +110,15 @@ class Runs:
     def _checked(self, found: Mapping[str, Any], run: Asked, batch: int, k: int = 0) -> dict[str, np.ndarray]:
         shape = (self.time.size, batch) if batch else (self.time.size,)
         if not isinstance(found, Mapping):
-            raise ModelError(f"the model returns {type(found).__name__}; it must return {{channel: readings}}.")
+            raise ModelError(
+                f"the model returns {type(found).__name__}; it must return {{channel: readings}}."
+            )
         readings = {}
         for name in self.model.channels:
             if name not in found:
-                raise ModelError(f"the model returns no {name!r}; it returns {', '.join(map(str, found)) or 'nothing'}.")
+                raise ModelError(
+                    f"the model returns no {name!r}; it returns {', '.join(map(str, found)) or 'nothing'}."
+                )
             try:
                 values = np.asarray(found[name], dtype=float)
             except (TypeError, ValueError):
@@ -153,4 +163,7 @@ def nested(numbers: Mapping[str, Any]) -> dict[str, Any]:
 
 def shown(numbers: Mapping[str, float]) -> str:
     """Return numbers in words, for messages."""
-    return ", ".join(f"{name} = {value:.6g}" for name, value in numbers.items() if np.isfinite(value)) or "no parameter"
+    return (
+        ", ".join(f"{name} = {value:.6g}" for name, value in numbers.items() if np.isfinite(value))
+        or "no parameter"
+    )

@@ -144,7 +144,9 @@ class Verdict:
             why = "; ".join(each.against) or f"its probability is {shown_probability(each.probability)}"
             lines += ["", f"Not named: {each.sentence}: {why}."]
         lines += ["", "Explanations, the most probable first:"]
-        lines += [f"  {shown_probability(p):>7}  {name}" for name, p in list(self.explanations.items())[:SHOWN]]
+        lines += [
+            f"  {shown_probability(p):>7}  {name}" for name, p in list(self.explanations.items())[:SHOWN]
+        ]
         lines += _budget_lines(self.budget, self.remainder)
         if self.visible_from and self.verdict in (NOTHING_WRONG, CALIBRATED, UNDECIDED):
             lines += ["", "What would be seen, if it were there, from this size on:"]
@@ -205,7 +207,9 @@ def shown_probability(p: float) -> str:
 
 def _nearness_lines(near: Nearness) -> list[str]:
     lines = ["Is the model near? " + ("Yes." if near.near else f"No: {'; '.join(near.reasons)}.")]
-    lines.append(f"  {'channel':<16}{'sensor':>10}{'left, free':>12}{'R':>8}{'left, with unknown inputs':>28}")
+    lines.append(
+        f"  {'channel':<16}{'sensor':>10}{'left, free':>12}{'R':>8}{'left, with unknown inputs':>28}"
+    )
     lines += [
         f"  {each.channel:<16}{each.level:>10.3g}{each.free:>12.3g}{each.ratio:>8.1f}{each.followed:>28.3g} {each.unit}"
         for each in near.left
@@ -221,7 +225,9 @@ def _nearness_lines(near: Nearness) -> list[str]:
 
 
 def _named_lines(each: Named) -> list[str]:
-    lines = [f"{each.sentence[:1].upper()}{each.sentence[1:]}: probability {shown_probability(each.probability)}"]
+    lines = [
+        f"{each.sentence[:1].upper()}{each.sentence[1:]}: probability {shown_probability(each.probability)}"
+    ]
     lines += [f"  {e.name} = {e.value:.4g} ± {e.sd:.2g} (nominal {e.nominal:.4g})" for e in each.estimates]
     if each.gain is not None:
         g = each.gain
@@ -235,7 +241,9 @@ def _budget_lines(budget: tuple[Share, ...], remainder: str) -> list[str]:
     if not budget:
         return [remainder] if remainder else []
     parts = [f"{share.term} takes {share.before - share.after:.2f}" for share in budget]
-    lines = f"Of {budget[0].before:.2f} levels of the sensors, {', '.join(parts)}; {budget[-1].after:.2f} stay."
+    lines = (
+        f"Of {budget[0].before:.2f} levels of the sensors, {', '.join(parts)}; {budget[-1].after:.2f} stay."
+    )
     return ["", lines + (f" {remainder}" if remainder else "")]
 
 

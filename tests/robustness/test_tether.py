@@ -4,6 +4,8 @@ Verifies: `cable.Tether`. Configuration: 20.5 m of heavy, elastic cable, one end
 and forces are compared bit by bit.
 """
 
+import copy
+import pickle
 import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 
@@ -161,6 +163,12 @@ def test_saving_looking_and_attempts_leave_no_trace():
     for k in range(1, 11):
         tether.save(), tether.linearise(0.1), repr(tether), tether.attempt(0.05, ends_at(0.1 * k - 0.05))
         assert np.array_equal(tether.step(0.1, ends_at(0.1 * k)), other.step(0.1, ends_at(0.1 * k)))
+
+
+def test_a_tether_is_not_copied():
+    for copied in (copy.copy, copy.deepcopy, pickle.dumps):
+        with pytest.raises(cable.TetherError, match="copied"):
+            copied(made())
 
 
 def test_saving_and_restoring_does_not_grow():
