@@ -28,7 +28,7 @@ from typing import Any
 _HOME = {
     "CALIBRATED": ("results", "CALIBRATED"),
     "CAUSE_NAMED": ("results", "CAUSE_NAMED"),
-    "Cause": ("results", "Cause"),
+    "Cause": ("subzero.identification", "Cause"),
     "ChannelGain": ("results", "ChannelGain"),
     "Curves": ("results", "Curves"),
     "DATA_ERROR": ("results", "DATA_ERROR"),
@@ -40,21 +40,29 @@ _HOME = {
     "Gain": ("results", "Gain"),
     "Logged": ("hypothesis.logged", "Logged"),
     "Misfit": ("results", "Misfit"),
+    "Model": ("subzero.identification", "Model"),
+    "ModelError": ("subzero.identification", "ModelError"),
     "NOISE": ("hypothesis.catalogue", "NOISE"),
     "NOTHING_NEAR": ("results", "NOTHING_NEAR"),
     "NOTHING_WRONG": ("results", "NOTHING_WRONG"),
+    "NamedCause": ("results", "Cause"),
     "NextTrial": ("results", "NextTrial"),
+    "Number": ("subzero.identification", "Number"),
     "ONSETS": ("hypothesis.catalogue", "ONSETS"),
     "OUTSIDE": ("results", "OUTSIDE"),
     "Parameter": ("hypothesis.effect", "Parameter"),
+    "Record": ("subzero.identification", "Record"),
     "Rival": ("results", "Rival"),
     "SAMPLED": ("hypothesis.catalogue", "SAMPLED"),
     "SPECS": ("hypothesis.catalogue", "SPECS"),
     "START": ("hypothesis.catalogue", "START"),
     "Sensing": ("hypothesis.configuration", "Sensing"),
+    "Sensor": ("subzero.identification", "Sensor"),
     "Setting": ("hypothesis.configuration", "Setting"),
+    "Start": ("subzero.identification", "Start"),
     "UNDECIDED": ("results", "UNDECIDED"),
-    "Unknown": ("results", "Unknown"),
+    "Unknown": ("subzero.identification", "Unknown"),
+    "UnknownForce": ("results", "Unknown"),
     "Verdict": ("results", "Verdict"),
     "all_effects": ("hypothesis.catalogue", "all_effects"),
     "apply_extended": ("hypothesis.hypotheses", "apply_extended"),
@@ -63,12 +71,13 @@ _HOME = {
     "diagnose_trials": ("api", "diagnose_trials"),
     "extended_toml": ("report.toml_file", "text_of"),
     "load_effects": ("hypothesis.catalogue", "load"),
+    "read": ("subzero.identification", "read"),
     "read_extended": ("report.toml_file", "read_extended"),
     "unseen": ("hypothesis.hypotheses", "unseen"),
     "with_free_onset": ("hypothesis.effect", "with_free_onset"),
     "with_onset": ("hypothesis.effect", "with_onset"),
 }
-"""Public name → (file, name there)."""
+"""Public name → (file here, or package, and the name there)."""
 
 __all__ = sorted(_HOME)
 
@@ -78,7 +87,8 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module '{__name__}' has no attribute '{name}'; it has {', '.join(__all__)}")
     file, inner = _HOME[name]
-    value = getattr(import_module(f"{__name__}.{file}"), inner)
+    home = file if file.startswith("subzero.") else f"{__name__}.{file}"
+    value = getattr(import_module(home), inner)
     globals()[name] = value
     return value
 

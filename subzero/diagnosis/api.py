@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+from subzero import identification
 from subzero.arguments import checked_arguments
 from subzero.channels import BY_NAME
 from subzero.diagnosis.assessment.goodness_of_fit import curves, misfits
@@ -73,21 +74,22 @@ MOST, EVEN = 1.0 - 1e-9, 0.5
 BUDGETS = ("screen", "verdict", "full")
 """Linear evidence only; up to the verdict and the extended model; with gain and next trial."""
 
-Given = Logged | Record | str | Path
+Given = Logged | Record | identification.Record | str | Path
 Seen = Callable[[tuple[Detectability, ...]], None]
 
 
 @checked_arguments
 def diagnose(
     records: Given | Sequence[Given],
-    model: str | Path | Model | None = None,
+    model: str | Path | Model | identification.Model | None = None,
     *,
     effects: str | Path | Sequence[Effect] = (),
     commands: str | None = None,
     progress: Progress | None = None,
     seed: int = 0,
     budget: str = "full",
-) -> Verdict:
+    held_out: identification.Record | Sequence[identification.Record] = (),
+) -> Verdict | identification.Verdict:
     """Say what a simulation gets wrong, name the cause, extend the model and measure the gain.
 
         >>> verdict = subzero.diagnose("record.csv", "fig6")
@@ -97,27 +99,49 @@ def diagnose(
     Args:
         records: CSV files, folders of them, records in memory, or `Logged` of `read_trials`; several are fitted
             together.
-        model: the scenario that was flown (sidecars may name their own), or another nominal model.
+        model: the scenario that was flown (sidecars may name their own), another nominal model, or a model of your own
+            (`Model` of this package), whose records are `Record` of this package.
         effects: causes of your own besides the catalogue: a Python file with EFFECTS, or the effects.
         commands: "record" or "scenario", if a record's commands may differ from the scenario's.
         progress: called with the fraction that is done, and a description of the current step.
         seed: of all random numbers.
         budget: "full", "verdict" without gain and next trial, or "screen" for the screening alone, in a few seconds.
+        held_out: records of a model of your own that no fit sees.
 
     Raises:
         UserError: a record, a sidecar or an effects file cannot be used.
         scenarios.ScenarioError: the scenario cannot be used.
     """
+    if isinstance(model, identification.Model):
+        return _of_own_model(records, model, held_out, progress)
     own = load(effects) if isinstance(effects, str | Path) else tuple(effects)
     logged = _logged([records] if isinstance(records, Given) else records, model, commands)
     return diagnose_trials(logged, effects=own, progress=progress, seed=seed, budget=budget)
+
+
+def _of_own_model(
+    records: Given | Sequence[Given],
+    model: identification.Model,
+    held_out: identification.Record | Sequence[identification.Record],
+    progress: Progress | None,
+) -> identification.Verdict:
+    """Diagnose a model of the user's own."""
+    given = [records] if isinstance(records, Given) else list(records)
+    own = [record for record in given if isinstance(record, identification.Record)]
+    if len(own) < len(given):
+        raise UserError(
+            "records of a model of your own are subzero.diagnosis.Record: read them by subzero.diagnosis.read."
+        )
+    return identification.diagnose(own, model, held_out=held_out, progress=progress)
 
 
 def _logged(records: Sequence[Given], model: str | Path | Model | None, commands: str | None) -> list[Logged]:
     """Return records with their trials, and with another nominal model if one is given."""
     scenario = None if isinstance(model, Model) else model
     found = [record for record in records if isinstance(record, Logged)]
-    paths = [record for record in records if not isinstance(record, Logged)]
+    paths = [record for record in records if not isinstance(record, Logged | identification.Record)]
+    if len(found) + len(paths) < len(records):
+        raise UserError("a subzero.diagnosis.Record needs a model of your own: diagnose(record, Model(...)).")
     found += read_trials(paths, scenario=scenario, commands=commands) if paths else []
     if not isinstance(model, Model):
         return found

@@ -6,14 +6,14 @@ problem → search → nearness → locks → verdict
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from subzero.arguments import checked_arguments
 from subzero.identification.candidates import declared
-from subzero.identification.explanation import Entry, Term, Terms, with_term, without
+from subzero.identification.explanation import Entry, Term, Terms, with_term
 from subzero.identification.fit import Fit, free_fit
 from subzero.identification.locks import Locks, locks
 from subzero.identification.model import Model
@@ -361,9 +361,8 @@ def _notes(problem: Problem, search: Search) -> tuple[str, ...]:
     for name, each in problem.channels.items():
         spikes = int((np.isfinite(each.values) & ~each.used).sum())
         if spikes:
-            found.append(
-                f"{name}: {spikes} readings are set aside: outside the record's time, or alone far from both neighbours."
-            )
+            why = "outside the record's time, or alone far from both neighbours"
+            found.append(f"{name}: {spikes} readings are set aside: {why}.")
         if not each.prior.declared:
             found.append(f"{name}: the noise of its sensor, {each.prior.level:.2g}, was read off the record.")
     if not search.complete:

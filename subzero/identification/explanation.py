@@ -181,21 +181,16 @@ def cause_terms(model: Model, duration: float) -> list[Term]:
     odds = min(PRIOR_CAUSE / max(len(model.causes), 1), MOST_LIKELY)
     found = []
     for cause in model.causes:
-        for size in cause.sizes if cause.numbers else (0.0,):
-            found.append(Term(cause.id, cause.sentence, "cause", cause.id, odds, size=size))
-        if cause.onset:
-            found += [
-                Term(
-                    f"{cause.id}@",
-                    f"from some time on, {cause.sentence}",
-                    "cause",
-                    cause.id,
-                    ONSET_ODDS * odds,
-                    begins=share * duration,
-                    ends=duration,
-                )
-                for share in ONSET_SHARES
-            ]
+        throughout = Term(cause.id, cause.sentence, "cause", cause.id, odds)
+        found += [replace(throughout, size=size) for size in (cause.sizes if cause.numbers else (0.0,))]
+        late = replace(
+            throughout,
+            id=f"{cause.id}@",
+            sentence=f"from some time on, {cause.sentence}",
+            odds=ONSET_ODDS * odds,
+            ends=duration,
+        )
+        found += [replace(late, begins=share * duration) for share in ONSET_SHARES if cause.onset]
     return found
 
 

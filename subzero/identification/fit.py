@@ -38,7 +38,8 @@ SIZE_RANGE = (-5.0, 6.0)
 @dataclass(frozen=True)
 class Levels:
     """What a fit takes as known while it moves θ: noise of the channels, sizes of the unknown inputs over the
-    declared ones."""
+    declared ones.
+    """
 
     noise: Mapping[str, Noise]
     sizes: Mapping[str, float]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from copy import copy
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -12,7 +12,7 @@ import numpy as np
 
 from subzero.errors import UserError
 from subzero.identification.explanation import INPUTS, Entry, Term, Terms, entries_of
-from subzero.identification.model import COMMAND, Cause, Model
+from subzero.identification.model import Model
 from subzero.identification.noise import NoisePrior, level_of, resolution_of
 from subzero.identification.record import Record
 from subzero.identification.simulation import Asked, Runs

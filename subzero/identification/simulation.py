@@ -140,7 +140,8 @@ class Runs:
         (first,) = self.readings([run], must=True)
         self._kept.clear()
         (second,) = self.readings([run], must=True)
-        assert first is not None and second is not None
+        assert first is not None
+        assert second is not None
         for name in first:
             if not np.array_equal(first[name], second[name]):
                 apart = float(np.max(np.abs(first[name] - second[name])))

@@ -12,7 +12,8 @@ from numpy.testing import assert_allclose
 import cable
 import scenarios
 import subzero
-from subzero.diagnosis import CAUSE_NAMED, Cause, Verdict
+from subzero.diagnosis import CAUSE_NAMED, Verdict
+from subzero.diagnosis import NamedCause as Cause
 
 STRANGE = "<script>alert(1)</script> $\\frac$ [bold] Zürich \x1b[31m " + "z" * 300
 MOST_LINES = 12

@@ -1,0 +1,135 @@
+"""What is hidden in the record of an oscillator is found; what no term holds is not named.
+
+Records are made by exact steps of the linear equations, the model integrates by Runge-Kutta: two codes. Tolerance: four
+standard deviations that the verdict gives, and a probability of 0.9 for a name.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import subzero.diagnosis as sd
+from tests.identification.oscillator import model, record
+
+
+def estimate(verdict, name):
+    (found,) = [each for named in verdict.named for each in named.estimates if each.name == name]
+    return found
+
+
+def changed(old, **columns):
+    """Return a record with other columns."""
+    return replace(old, columns={**old.columns, **columns})
+
+
+def test_nothing_is_wrong_with_a_healthy_oscillator():
+    verdict = sd.diagnose(record(0), model())
+    assert verdict.verdict == "nothing_wrong"
+    assert verdict.named == ()
+    assert verdict.nearness.near
+    assert verdict.visible_from["stiffness"]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "hidden, cause, number, true",
+    [({"k": 4.6}, "stiffness", "k", 4.6), ({"c": 0.5}, "damping", "c", 0.5)],
+)
+def test_a_hidden_change_of_a_parameter_is_named_with_its_size(hidden, cause, number, true):
+    verdict = sd.diagnose(record(0, **hidden), model())
+    assert [each.id for each in verdict.causes] == [cause]
+    found = estimate(verdict, number)
+    assert abs(found.value - true) < 4.0 * found.sd + 0.002 * true
+    assert verdict.causes[0].gain.holds
+
+
+@pytest.mark.long
+def test_twins_are_not_told_apart():
+    seen = record(0, gain=1.15)
+    verdict = sd.diagnose(seen, model())
+    assert verdict.verdict == "undecided"
+    probable = [name for name, p in verdict.explanations.items() if p > 0.1]
+    assert set(probable) == {"drive", "scale:x"}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("unknown", [True, False])
+@pytest.mark.parametrize("second", [0.02, 0.3])
+def test_a_second_mass_that_no_term_holds_names_nothing(second, unknown):
+    verdict = sd.diagnose(record(0, second=second), model(unknown=unknown))
+    assert verdict.named == ()
+    if second == 0.3:
+        assert verdict.verdict == "nothing_near"
+        assert "not near" in str(verdict).splitlines()[0]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "factor, words", [(1.0 / 0.3048, "feet"), (-1.0, "other sign"), (1000.0, "thousand times too large")]
+)
+def test_a_unit_is_named_whatever_the_parameters_would_bend(factor, words):
+    seen = record(1)
+    verdict = sd.diagnose(changed(seen, x=factor * seen.columns["x"]), model())
+    assert [each.id for each in verdict.named] == ["unit:x"]
+    assert words in verdict.named[0].sentence
+
+
+@pytest.mark.long
+def test_a_factor_that_is_in_no_list_is_found_all_the_same():
+    seen = record(1)
+    verdict = sd.diagnose(changed(seen, x=0.2 + 7.3 * seen.columns["x"]), model())
+    assert [each.id for each in verdict.named] == ["affine:x"]
+    assert estimate(verdict, "factor").value == pytest.approx(7.3, rel=0.02)
+
+
+@pytest.mark.long
+def test_a_sensor_that_stands_still_is_named_and_only_that():
+    seen = record(2)
+    x = seen.columns["x"].copy()
+    x[100:180] = x[100]
+    verdict = sd.diagnose(changed(seen, x=x), model())
+    (found,) = verdict.suspected + verdict.named
+    assert found.id == "stuck:x@0"
+    assert found.probability > 0.9
+
+
+@pytest.mark.long
+def test_an_input_that_is_late_is_found_with_its_delay():
+    seen = record(3)
+    late = 0.3
+    force = np.interp(seen.time + late, seen.time, seen.columns["force"])
+    verdict = sd.diagnose(changed(seen, force=force), model())
+    told = {each.id: each for each in verdict.named + verdict.suspected}
+    assert set(told) <= {"delay:inputs", "delay:x"}
+    delays = [e.value for each in told.values() for e in each.estimates]
+    assert delays[0] == pytest.approx(late, abs=0.05)
+
+
+@pytest.mark.long
+def test_what_is_named_is_the_same_for_a_function_of_one_set():
+    batch = sd.diagnose(record(0, k=4.6), model())
+    single = sd.diagnose(record(0, k=4.6), replace(model(), batch=False))
+    assert batch.to_json() == single.to_json()
+
+
+@pytest.mark.long
+def test_of_several_records_each_is_predicted_by_a_fit_of_the_others():
+    verdict = sd.diagnose([record(0, k=4.6), record(1, k=4.6)], model(unknown=False))
+    assert [each.id for each in verdict.causes] == ["stiffness"]
+    assert verdict.causes[0].gain.what == "each record by a fit of the others"
+
+
+def test_a_verdict_is_text_json_and_a_picture(tmp_path):
+    import json
+
+    import matplotlib.pyplot as plt
+
+    plt.switch_backend("agg")
+    verdict = sd.diagnose(record(0, samples=100), model(causes=("stiffness", "cubic"), unknown=False))
+    found = json.loads(verdict.to_json())
+    assert found["verdict"] == verdict.verdict
+    assert found["nearness"]["left"][0]["channel"] == "x"
+    figure = verdict.plot()
+    assert len(figure.axes) == 2
+    plt.close(figure)
