@@ -19,8 +19,8 @@ F_c            force on the vehicle                 N         (12), f_1 − ½Q_
 α, β           angles of the paper's local frame    rad       (3)-(4)                            feng_allen/equation7
 
 What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`properties`, `drum`, `winch`, `current`,
-`schemes`) and give (`history`). A call makes a `task` of it, which one of three formulations computes; they share
-nothing else:
+`schemes`) and give (`history`); and `tether.Tether`, which another simulator steps, in the default formulation. A call
+makes a `task` of it, which one of three formulations computes; they share nothing else:
 
 * `moving_end`, the default: balances are vectors (their equivalence with the paper's six scalar equations, whose signs
   are derived again, is in `feng_allen.equation7` and tested), time is differenced backward, and a step is solved by
@@ -37,6 +37,7 @@ from cable.properties import CableProperties
 from cable.pull_out import SCHEMES, pull_out, tow
 from cable.schemes import Equation7, Lumped, MovingEnd, Paper
 from cable.task import MovingDrum
+from cable.tether import Tether, TetherError, TetherState
 from cable.winch import Brake, ConstantTension, PayOutRate
 
 __all__ = [
@@ -56,6 +57,9 @@ __all__ = [
     "Outcome",
     "Paper",
     "PayOutRate",
+    "Tether",
+    "TetherError",
+    "TetherState",
     "hold",
     "pull_out",
     "tow",

@@ -16,6 +16,7 @@ a step made real; a node more or less at the drum             remeshing
 a velocity that changes at once                               jolt
 the run: start, steps by their error, results, why it stopped initial_shape, time_loop, stops
 where a cable comes to rest                                   equilibrium
+a step to where a host moves the ends                         host_step
 where the work goes                                           energy
 """
 

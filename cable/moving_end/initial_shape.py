@@ -10,9 +10,19 @@ from cable.current import Water
 from cable.drum import FREE, TURNING, DrumNumbers
 from cable.history import Equilibrium
 from cable.moving_end.segment_load import Load, segment_momentum
-from cable.moving_end.state import BEFORE, LONGEST, NEW, NOW, SPLIT_AT, Line, sample_water, spacing
+from cable.moving_end.state import (
+    BEFORE,
+    LONGEST,
+    NEW,
+    NOW,
+    SPLIT_AT,
+    Line,
+    new_line,
+    sample_water,
+    spacing,
+)
 from cable.properties import CableNumbers, CableProperties
-from cable.tow_path import first_direction
+from cable.tow_path import first_direction, segments_needed
 from subzero.jit import compiled
 
 
@@ -166,3 +176,30 @@ def _grown(T: float, length: float, drag: float, weight: float, e: float) -> flo
     while abs(end - before) > 1e-15 * abs(end):
         before, end = end, T + length * (drag * sqrt(1.0 + e * 0.5 * (T + end)) + weight)
     return max(end, 0.0)
+
+
+def straight_between(
+    states: np.ndarray, length: float, each: float, drum: DrumNumbers, c: CableNumbers
+) -> Line:
+    """Return a straight line between the ends; one of no length lies along the way of its first end."""
+    apart, drum.velocity[:] = states[0, 0] - states[1, 0], states[1, 1]
+    direction = first_direction(np.array([apart, states[0, 1] - states[1, 1]]))
+    line = new_line(segments_needed(length, each, 0.0))
+    line.ends.layout.segment_length = each
+    lay_straight(line, length, direction, states[0, 1], drum, c)
+    line.ends.drum_force[:] = -direction * float(line.node_tension[line.ends.count])
+    return line
+
+
+def towed_from(
+    cable: CableProperties, state: np.ndarray, length: float, each: float, J: np.ndarray, tail_drag: float
+) -> tuple[Line, np.ndarray]:
+    """Return a line that is towed steadily, and the place from which its places are counted: that of its tail."""
+    count = max(1, int(np.ceil(length / each - 1e-9)))
+    line = new_line(count)
+    line.ends.layout.segment_length = length / count
+    uphill = steady_direction(state[1:], J, cable, tail_drag)
+    lay_straight(line, length, uphill, state[1], DrumNumbers.at_rest(), cable.numbers())
+    line.ends.layout.free_end, line.ends.layout.tail_drag = True, tail_drag
+    set_steady_tow(line, state[1], J, cable, tail_drag)
+    return line, state[0] - line.position[NOW, 0]

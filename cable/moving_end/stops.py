@@ -15,6 +15,7 @@ import numpy as np
 from cable.drum import FREE, LENGTH, TENSION, DrumNumbers
 from cable.moving_end.state import NEW, NOW, Line
 from cable.properties import CableNumbers
+from subzero.errors import short
 
 EQUATIONS = ("length", "northward balance", "eastward balance", "downward balance")
 NEARLY_TAUT = 0.999
@@ -90,3 +91,35 @@ def _remedy(line: Line, drum: DrumNumbers, c: CableNumbers, words: Names) -> str
     if drum.control == LENGTH and not line.ends.layout.free_end:
         return f"{words.yielding}, compliance = 1e-3, or a higher {words.rate}"
     return f"a shorter {words.step}, or a longer {words.segment}"
+
+
+def describe_jump(now: float, dt: float, here: np.ndarray, states: np.ndarray) -> str:
+    """Return which end of a tether jumps, and how far; `here` and `states` are before and after it (ends, 2, 3)."""
+    miss = states[:, 0] - here[:, 0] - 0.5 * dt * (here[:, 1] + states[:, 1])
+    end = int(np.argmax(np.linalg.norm(miss, axis=1)))
+    way, before, after = np.linalg.norm([states[end, 0] - here[end, 0], here[end, 1], states[end, 1]], axis=1)
+    return (
+        f"At t = {now:g} s ends[{end}] is to move {way:.4g} m within {dt:g} s, at {before:.4g} m/s before and "
+        f"{after:.4g} m/s after: it jumps. Give the velocity that belongs to the motion, take shorter steps, or make "
+        "another tether where the host was put elsewhere."
+    )
+
+
+def describe_bad_number(now: float, states: np.ndarray) -> str:
+    """Return which end of a tether a host gave a place or a velocity that is no number; states (ends, 2, 3)."""
+    end, row = np.argwhere(~np.isfinite(states).all(axis=2))[0]
+    return (
+        f"At t = {now:g} s the host gave ends[{end}] the {('place', 'velocity')[row]} "
+        f"{short(states[end, row].tolist())}: three finite numbers are needed, north, "
+        "east, down. Look one step earlier in the host for where it comes from."
+    )
+
+
+def describe_reach(now: float, states: np.ndarray, most: float, c: CableNumbers) -> str:
+    """Return that the ends of a tether would be farther apart than `most` [m] of cable can be; states (ends, 2, 3)."""
+    way = float(np.linalg.norm(states[0, 0] - states[-1, 0]))
+    can = "be pulled to twice that" if c.compliance else "not stretch"
+    return (
+        f"At t = {now:g} s the ends are to be {way:.6g} m apart, and there are {most:.6g} m of cable, which can {can}. "
+        "Pay out, hold the ends back, or give the cable a compliance."
+    )

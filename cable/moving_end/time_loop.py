@@ -46,7 +46,7 @@ from cable.tow_path import (
     segments_needed,
 )
 from cable.winch import Brake, PayOutRate
-from subzero.jit import allocating, compiled, inner
+from subzero.jit import compiled, inner, scratch
 
 MOST_HALVINGS = 10
 """A failing step is halved up to this many times before the run gives up."""
@@ -138,7 +138,7 @@ def follow_path(
     energy_flow(line, c, work, record.ledger[1])
     write_row(line, record, 0, 0, c)
     for k in range(1, rows):
-        suggested = _cover(line, path, k, led, water, c, drum, rtol, suggested, work, record)
+        suggested = cover(line, path, k, led, water, c, drum, rtol, suggested, work, record)
         # Out of memory for a row is treated like a step that failed: the caller keeps the rows that are filled.
         if not line.ends.solved.converged or used + line.ends.count + 1 > record.tension.size:
             return k
@@ -148,8 +148,8 @@ def follow_path(
     return rows
 
 
-@allocating
-def _cover(
+@inner
+def cover(
     line: Line,
     path: TowPath,
     k: int,
@@ -164,8 +164,10 @@ def _cover(
 ) -> float:
     """Go from times[k−1] to times[k], in smaller steps where needed; return the step to go on with."""
     whole = path.times[k] - path.times[k - 1]
-    finest, done, spent, point = whole * 0.5**MOST_CUTS, 0.0, 0, np.zeros(3)
-    jump = path.leaving[k - 1] - path.arriving[k - 1]
+    finest, done, spent, point = whole * 0.5**MOST_CUTS, 0.0, 0, scratch(1, 3)[0]
+    jump = scratch(1, 3)[0]
+    for i in range(3):
+        jump[i] = path.leaving[k - 1, i] - path.arriving[k - 1, i]
     # In row 1 the jump from rest is part of the initial state, which `lay_straight` has filled.
     if k > 1 and take_jolt(line, jump, c, drum, work, record.impulse[k - 1]):
         energy_flow(line, c, work, record.ledger[1])

@@ -38,6 +38,10 @@ EXAMPLES = {
     ),
     "challenge": ("subzero challenge fig6 --seed 38 --out hidden", "subzero challenge --reveal hidden"),
     "sweep": ("subzero sweep cable_and_current.toml",),
+    "export-fmu": (
+        "subzero export-fmu --length 30",
+        "subzero export-fmu rov_umbilical --length 60 --longest 200 --out umbilical.fmu",
+    ),
     "doctor": ("subzero doctor",),
     "warm": ("subzero warm",),
     "completion": ("subzero completion bash > ~/.local/share/bash-completion/completions/subzero",),
