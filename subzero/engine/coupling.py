@@ -76,7 +76,7 @@ def exchange(setup: Setup, live: Live, start: float, span: float) -> int:
                 return ending
 
 
-@compiled
+@inner
 def _follow_snaps(setup: Setup, live: Live, start: float, span: float) -> int:
     """Take one exchange in parts that follow the jumps of the pull; the next one goes on with parts as long.
 
@@ -167,7 +167,7 @@ def hull_steps(setup: Setup, span: float) -> int:
     return max(1, int(np.ceil(span / setup.fixed.hull_step - 1e-6)))
 
 
-@inlined
+@inner
 def _agree(setup: Setup, live: Live, start: float, span: float) -> int:
     """Find the force at the end of an exchange with which hull and cable agree; nothing is made real yet."""
     # First guess: the force goes on with the slope of the exchange before, and bends as it did there.
@@ -358,7 +358,7 @@ def _solve_three(M: np.ndarray, b: np.ndarray) -> None:
         b[k] /= M[k, k]
 
 
-@inlined
+@inner
 def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
     """Make the exchange real: state, forces, cable, energies."""
     steps = hull_steps(setup, span)
