@@ -16,12 +16,13 @@ GRAVITY = 9.81
 
 
 class CableNumbers(Record):
-    """The cable as compiled code sees it: m, ρA, w_c, e, the drag constants ½ρdπC_t and ½ρdC_n."""
+    """The cable as compiled code sees it: m, ρA, w_c, e, B e, the drag constants ½ρdπC_t and ½ρdC_n."""
 
     mass: float
     added_mass: float
     weight: float
     compliance: float
+    retardation: float
     tangential_drag: float
     normal_drag: float
 
@@ -48,6 +49,7 @@ class CableProperties:
         tangential_drag_coefficient: C_t, on the wetted surface π d. [-]
         normal_drag_coefficient: C_n, on the projected area d. [-]
         compliance: e = 1/(E A); 0 is an inextensible cable. [1/N]
+        internal_damping: B, of stretch, T = E A ε + B dε/dt; see `moving_end.slack_law`. [N s]
         bending_stiffness: E I; see `moving_end.bending`. [N m²]
         strength: the load that it may carry, working or breaking; 0 is not known. Nothing is computed with it. [N]
         minimum_bend_radius: the tightest bend that it may take; 0 is not known. Nothing is computed with it. [m]
@@ -63,6 +65,7 @@ class CableProperties:
     tangential_drag_coefficient: float = 0.01
     normal_drag_coefficient: float = 1.0
     compliance: float = 0.0
+    internal_damping: float = 0.0
     bending_stiffness: float = 0.0
     strength: float = 0.0
     minimum_bend_radius: float = 0.0
@@ -73,6 +76,12 @@ class CableProperties:
             above = 0.0 if each.name in ABOVE_ZERO else None
             value = checked(type(self).__name__, each.name, getattr(self, each.name), least=0.0, above=above)
             object.__setattr__(self, each.name, value)
+        if self.internal_damping > 0.0 and self.compliance == 0.0:
+            message = (
+                f"CableProperties: internal_damping is {self.internal_damping:g} N s, with compliance = 0: what does "
+                "not stretch damps nothing. Give the cable its compliance, 1/(E A), or leave internal_damping at 0."
+            )
+            raise BadValueError(message)
 
     @property
     def virtual_mass_per_length(self) -> float:
@@ -109,6 +118,7 @@ class CableProperties:
             "added_mass": self.water_density * self.cross_section_area,
             "weight": self.weight_in_water,
             "compliance": self.compliance,
+            "retardation": self.internal_damping * self.compliance,
             "tangential_drag": self.tangential_drag,
             "normal_drag": self.normal_drag,
         }

@@ -17,7 +17,7 @@ from cable.history import Equilibrium, History
 from cable.moving_end import time_loop
 from cable.properties import CableProperties
 from cable.schemes import Equation7, Lumped, MovingEnd, Options, Paper
-from cable.task import EQUILIBRIUM, EVERYTHING, Drum, MovingDrum, PullOut, Tow
+from cable.task import EQUILIBRIUM, EVERYTHING, INTERNAL_DAMPING, Drum, MovingDrum, PullOut, Tow
 from cable.tow_path import Velocity
 from subzero.arguments import checked_arguments
 from subzero.errors import BadValueError, short, suggestion
@@ -65,7 +65,7 @@ SCHEMES: Mapping[str, Scheme] = {
     "paper_tangent": Scheme(Paper(reading="tangent"), _in_angles, None, PLAIN),
     "paper_drum": Scheme(Paper(reading="drum"), _in_angles, None, PLAIN),
     "equation7": Scheme(Equation7(), _in_angles, None, PLAIN),
-    "lumped": Scheme(Lumped(), _lumped_pull_out, _lumped_tow, EVERYTHING - {EQUILIBRIUM}),
+    "lumped": Scheme(Lumped(), _lumped_pull_out, _lumped_tow, EVERYTHING - {EQUILIBRIUM, INTERNAL_DAMPING}),
 }
 """Name → the scheme; the first is the default, and "paper" the usable reading of the paper's."""
 

@@ -27,7 +27,8 @@ START_LENGTH = 1e-6
 
 WINCH, MOVING_DRUM, UNEVEN_CURRENT = "a winch", "a drum that moves", "a current that changes"
 WET_LENGTH, EQUILIBRIUM = "cable in the water at the start", "a start from cable.hold"
-EVERYTHING = frozenset({WINCH, MOVING_DRUM, UNEVEN_CURRENT, WET_LENGTH, EQUILIBRIUM})
+INTERNAL_DAMPING = "internal damping of the cable"
+EVERYTHING = frozenset({WINCH, MOVING_DRUM, UNEVEN_CURRENT, WET_LENGTH, EQUILIBRIUM, INTERNAL_DAMPING})
 """Features that a task may ask for beyond a free drum on the shore, uniform water and no cable at the start."""
 
 
@@ -116,6 +117,7 @@ class PullOut:
             UNEVEN_CURRENT: self.current.velocity.size != 3,
             WET_LENGTH: not isinstance(self.start, Equilibrium) and self.start > 0.0,
             EQUILIBRIUM: isinstance(self.start, Equilibrium),
+            INTERNAL_DAMPING: self.cable.internal_damping > 0.0,
         }
         return [what for what, is_asked in asked.items() if is_asked]
 

@@ -35,6 +35,7 @@ LEAF_KEYS = ("value", "unit", "range", "tolerance", "limits", "source")
 
 SERVOS = ("rudder_servo", "stern_plane_port_servo", "stern_plane_starboard_servo")
 OPTIONAL = {
+    "cable.internal_damping": 0.0,
     "cable.bending_stiffness": 0.0,
     "cable.strength": 0.0,
     "cable.minimum_bend_radius": 0.0,

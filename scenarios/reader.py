@@ -359,6 +359,6 @@ def check_scheme(source: Source, run: Mapping[str, Any], cable: Mapping[str, flo
         asked.append("a profile in [water]")
     if run.get("grading", 0.0) > 0.0:
         asked.append("grading")
-    if cable.get("bending_stiffness", 0.0) > 0.0:
-        asked.append("the cable's bending_stiffness")
+    features = ("internal_damping", "bending_stiffness")
+    asked += [f"the cable's {name}" for name in features if cable.get(name, 0.0) > 0.0]
     return [source.problem("run.scheme", ONLY_DEFAULT, only_default(asked), found=scheme)] if asked else []

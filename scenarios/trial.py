@@ -331,7 +331,9 @@ class Trial:
         for name, found, why, remedy in misfits({n: getattr(self, n) for n in RUN_FIELDS} | vars(self.start)):
             check.say(name, why, remedy, found)
         asked = [name for name in ("profile", "winch", "vessel", "grading") if getattr(self, name)]
-        asked += ["bending_stiffness"] if self.cable.get("bending_stiffness", 0.0) > 0.0 else []
+        asked += [
+            name for name in ("internal_damping", "bending_stiffness") if self.cable.get(name, 0.0) > 0.0
+        ]
         if self.scheme != SCHEMES[0] and asked:
             check.say("scheme", ONLY_DEFAULT, only_default(asked), self.scheme)
         check.refuse()

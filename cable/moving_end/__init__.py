@@ -30,6 +30,7 @@ from cable.moving_end.energy import (
     STORED,
     STRAINED,
     TOWED,
+    damping_loss,
     energy_flow,
 )
 from cable.moving_end.initial_shape import lay_held, lay_straight, start_in_water
@@ -56,6 +57,7 @@ __all__ = [
     "Load",
     "Names",
     "accept",
+    "damping_loss",
     "describe_stop",
     "energy_flow",
     "enlarged",

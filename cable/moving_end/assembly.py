@@ -46,7 +46,7 @@ from cable.moving_end.segment_load import (
     measured_chord,
     take_segment,
 )
-from cable.moving_end.slack_law import fading_rate, slack_law, turning_rate
+from cable.moving_end.slack_law import damped_share, fading_rate, slack_law, turning_rate
 from cable.moving_end.state import (
     BEFORE,
     DIAGONAL,
@@ -107,7 +107,7 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
     for j in range(1, N + 1):
         length, T = _length(line, j), line.tension[NEW, j]
         work.square, work.chord_length, work.shorter = ahead
-        by_strain = _length_equation(line, j, T, c, work.square, slopes)
+        by_strain = _length_equation(line, j, T, w, c, work.square, slopes)
         take_segment(line.position[NEW], line.velocity[NEW], line.water[NEW], j, work)
         beyond = min(j + 1, N)
         ahead = measured_chord(line.position[NEW], beyond, _length(line, beyond))
@@ -241,14 +241,41 @@ def _sharpen_tow_force(line: Line) -> None:
 
 
 @inlined
-def _length_equation(line: Line, j: int, T: float, c: CableNumbers, square: float, slopes: bool) -> float:
-    """Write the length equation of segment j, whose |d|²/ℓ² is `square`; return ∂φ/∂σ."""
-    stretch = 1.0 + c.compliance * T
+def _length_equation(
+    line: Line, j: int, T: float, w: Weights, c: CableNumbers, square: float, slopes: bool
+) -> float:
+    """Write the length equation of segment j, whose |d|²/ℓ² is `square`; return −2 ∂φ/∂(|d|²/ℓ²), which is ∂φ/∂σ."""
+    stretch, damping = 1.0 + c.compliance * T, 1.0
+    if c.retardation > 0.0:
+        past, weight = _past_stretch(line, j, w)
+        square, damping = damped_share(square, past, weight, c.retardation)
     phi, by_T, by_strain = slack_law(T, 0.5 * (stretch * stretch - square), line.ends.solver.smoothing)
     line.rows[RESIDUAL, j, 0] = phi
     if slopes:
         line.blocks[DIAGONAL, j, 0, 0] = by_T + by_strain * stretch * c.compliance
-    return by_strain
+    return by_strain * damping if c.retardation > 0.0 else by_strain
+
+
+@inlined
+def _past_stretch(line: Line, j: int, w: Weights) -> tuple[float, float]:
+    """Return what the stretch of segment j before adds to its rate, and the weight of the new one in it. [1/s].
+
+    To first order where it was slack before: a difference of second order overshoots at that corner.
+    """
+    now, before = _stretch_at(line, NOW, j), _stretch_at(line, BEFORE, j)
+    if w.a2 > 0.0 and now > 0.0 and before > 0.0:
+        return w.a1 * now + w.a2 * before, w.a0
+    return -w.first * now, w.first
+
+
+@inlined
+def _stretch_at(line: Line, level: int, j: int) -> float:
+    """Return ε⁺ of segment j at a level; none of a last one that was not out of the drum then. [-]."""
+    length = line.ends.last_length[level] if j == line.ends.count else line.length[j]
+    if length <= 0.0:
+        return 0.0
+    square, _, _ = measured_chord(line.position[level], j, length)
+    return max(sqrt(square) - 1.0, 0.0)
 
 
 @inlined

@@ -5,7 +5,8 @@ Relative to the water, U = V − J, the balance of `segment_load` times U gives
     −F·U(0) = dE/dt + L − G + D_S + M + C
 
 with F the force on the vehicle, E = ∫(½mU² + ½ρA U_⊥² + ½eT²) ds (and bending) the energy in the water, L = ∫D·U ds the
-loss to drag, G = ∫w_c U_k ds the work of gravity, and
+loss to drag (and to internal damping; then ε⁺/e, the pull of the stretch alone, takes the place of T in E),
+G = ∫w_c U_k ds the work of gravity, and
 
     D_S = −F_S·U(S) − (dS/dt) e(S)       work on the drum, F_S = T_N t_N + ½Q_N, less the energy that enters with new
                                          cable; at a free end, the loss of the drogue
@@ -22,21 +23,22 @@ import numpy as np
 
 from cable.moving_end.bending import bending_energy
 from cable.moving_end.segment_load import Load, evaluate_load, measured_chord, take_segment
+from cable.moving_end.slack_law import KNOWN
 from cable.moving_end.state import BEFORE, NOW, Line
 from cable.properties import CableNumbers
 from subzero.jit import compiled, inlined, inner
 
-LOSS, STORED, GRAVITY_WORK, AT_DRUM, ADDED_MASS, STRAINED, CARRIED, TOWED = range(8)
-"""Entries that `energy_flow` fills: L, E [J], G, D_S, M, −∫T t·∂J/∂s ds, ∫m U·dJ/dt ds (mean over a step), −F·U(0).
-[W]"""
-FLOWS = 8
+LOSS, STORED, GRAVITY_WORK, AT_DRUM, ADDED_MASS, STRAINED, CARRIED, TOWED, DAMPED = range(9)
+"""Entries that `energy_flow` fills: L to drag, E [J], G, D_S, M, −∫T t·∂J/∂s ds, ∫m U·dJ/dt ds (mean over a step),
+−F·U(0), L to internal damping. [W]"""
+FLOWS = 9
 
 
 @inner
 def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> None:
     """Fill out (FLOWS,) with the powers and the stored energy of the cable at level NOW."""
     N, t, across, V, J = line.ends.count, work.tangent, work.across, work.velocity, work.water
-    loss, energy, sunk, added, strained, carried = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    loss, energy, sunk, added, strained, carried, damped = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(1, N + 1):
         length = line.ends.last_length[NOW] if j == N else line.length[j]
         T = line.tension[NOW, j]
@@ -51,15 +53,34 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
             loss += length * work.drag[i] * speed
             turn += across[i] * (line.velocity[NOW, j, i] - line.velocity[NOW, j - 1, i])
             strained -= T * t[i] * (line.water[NOW, j, i] - line.water[NOW, j - 1, i])
-        stored = c.mass * square + c.added_mass * work.side * work.side + c.compliance * T * T
+        elastic = T
+        if c.retardation > 0.0:
+            elastic = max(np.sqrt(work.square) - 1.0, 0.0) / c.compliance
+            damped += length * _damping_power(line, j, T, elastic, c)
+        stored = c.mass * square + c.added_mass * work.side * work.side + c.compliance * elastic * elastic
         energy += 0.5 * length * stored
         sunk += length * c.weight * (V[2] - J[2])
         added -= c.added_mass * work.along * turn * length / work.chord_length
         carried += length * c.mass * _carried(line, j)
     out[LOSS], out[STORED], out[GRAVITY_WORK], out[ADDED_MASS] = loss, energy, sunk, added
     out[STRAINED], out[CARRIED], out[AT_DRUM], out[TOWED] = strained, carried, 0.0, 0.0
+    out[DAMPED] = damped
     out[STORED] += bending_energy(line, c)
     _flow_at_ends(line, c, out)
+
+
+@inlined
+def _damping_power(line: Line, j: int, T: float, elastic: float, c: CableNumbers) -> float:
+    """Return the loss (T − ε⁺/e) dε⁺/dt per length of segment j, whose stretch alone pulls with `elastic`. [N/s]."""
+    if T > KNOWN:
+        return (T - elastic) * (T - elastic) * c.compliance / c.retardation
+    # A segment that does not pull although it is stretched goes back on its own; its rate is that of the last step.
+    if elastic == 0.0 or line.ends.previous_step <= 0.0 or line.ends.last_length[BEFORE] <= 0.0:
+        return 0.0
+    length = line.ends.last_length[BEFORE] if j == line.ends.count else line.length[j]
+    square, _, _ = measured_chord(line.position[BEFORE], j, length)
+    change = elastic * c.compliance - max(np.sqrt(square) - 1.0, 0.0)
+    return -elastic * change / line.ends.previous_step
 
 
 @inlined
@@ -101,6 +122,15 @@ def _flow_at_ends(line: Line, c: CableNumbers, out: np.ndarray) -> None:
         out[AT_DRUM] -= line.ends.drum_force[i] * (line.velocity[NOW, N, i] - line.water[NOW, N, i])
 
 
+@inlined
+def damping_loss(old: np.ndarray, new: np.ndarray, step: float) -> float:
+    """Return the loss to internal damping in a step [s], of the flows at its ends. [J].
+
+    By the trapezoidal rule, but for the step in which a slack cable comes taut: a dashpot pulls fully at once.
+    """
+    return 0.5 * step * (old[DAMPED] + new[DAMPED]) if old[DAMPED] > 0.0 else step * new[DAMPED]
+
+
 @inner
 def book_step(line: Line, step: float, c: CableNumbers, work: Load, ledger: np.ndarray) -> None:
     """Add an accepted step to a ledger (3, FLOWS): flows before, flows now, and the sums of work, terms and residual.
@@ -117,7 +147,9 @@ def book_step(line: Line, step: float, c: CableNumbers, work: Load, ledger: np.n
     spent = half * (old[LOSS] + new[LOSS]) + half * (old[AT_DRUM] + new[AT_DRUM])
     spent += half * (old[ADDED_MASS] + new[ADDED_MASS] + old[STRAINED] + new[STRAINED])
     spent += step * new[CARRIED] - half * (old[GRAVITY_WORK] + new[GRAVITY_WORK])
+    damped = damping_loss(old, new, step)
+    spent += damped
     towed = half * (old[TOWED] + new[TOWED])
     total[TOWED] += towed
-    total[LOSS] += abs(towed) + half * (old[LOSS] + new[LOSS])
+    total[LOSS] += abs(towed) + half * (old[LOSS] + new[LOSS]) + damped
     total[STORED] += towed - stored - spent

@@ -8,6 +8,14 @@ A thin cable cannot be compressed: it buckles, and its chord gets shorter. With 
 which is smoothed to T σ = T₀ (`SMOOTHING`, 1e-13 N) and written as one equation that suits Newton's method,
 the Fischer-Burmeister function φ(a, b) = a + b − √(a² + b² + 2μ) = 0 with a = T/T_r and b = σ/σ_r.
 
+A cable with internal damping B of its stretch ε = |d|/ℓ − 1 (Kelvin and Voigt: a spring with a parallel dashpot)
+pulls with T = EA ε + B dε/dt, so σ has the stretch of a spring that it would take to pull as hard,
+
+    σ = ½(1 + eT)² − ½(|d|/ℓ + τ dε⁺/dt)²,    τ = B e,   ε⁺ = max(ε, 0)
+
+τ is the time in which a stretched cable goes back. A dashpot does not push either: where a cable gets shorter faster
+than that, it is slack before it is as short as it was. Per length it loses (T − ε⁺/e) dε⁺/dt.
+
 Departs from source: the paper takes the cable as taut everywhere (its equations are singular at T = 0). The cost of
 the smoothing is a strain of T₀/T: 1e-12 at a tenth of a newton. What happens inside a slack bight (folding, contact,
 bending) is not modelled: without bending stiffness its shape below one segment length is ill-posed, and only its
@@ -46,6 +54,22 @@ def slack_law(T: float, shortening: float, smoothing: float) -> tuple[float, flo
     # a + b − s, without cancellation when one of the two is large
     phi = 2.0 * (a * b - mu) / (a + b + s) if a + b > 0.0 else a + b - s
     return phi, (1.0 - a / s) / TENSION_SCALE, (1.0 - b / s) / STRAIN_SCALE
+
+
+@inlined
+def damped_share(square: float, past: float, weight: float, tau: float) -> tuple[float, float]:
+    """Return (|d|/ℓ + τ dε⁺/dt)² and its derivative by |d|²/ℓ². [-].
+
+    Args:
+        square: |d|²/ℓ² at the new time. [-]
+        past: what the stretches before add to dε⁺/dt, see `bdf2`. [1/s]
+        weight: weight of the new stretch in it. [1/s]
+        tau: τ, above 0. [s]
+    """
+    share = sqrt(square)
+    damped = max(share + tau * (weight * max(share - 1.0, 0.0) + past), 0.0)
+    by_share = 1.0 + tau * weight if share > 1.0 else 1.0
+    return damped * damped, damped * by_share / share
 
 
 @inlined

@@ -61,11 +61,17 @@ class Solver(Record):
         tolerance: how exactly, see `time_step`. [-]
         smoothing: T₀ of the slack law in force. [N]
         factored: whether the blocks hold the factors of the last Newton matrix.
+        rounding: how many times the rounding of a strain is seen in a length equation: 1, or 1 + τ/Δt with damping. [-]
+        bold_steps: so many Newton steps are still taken whole, whatever they do to the residual.
+        pulls_only: whether no Newton step goes to a tension below zero, see `time_step.go_from_guess`.
     """
 
     tolerance: float = TOLERANCE
     smoothing: float = SMOOTHING
     factored: bool = False
+    rounding: float = 1.0
+    bold_steps: int = 0
+    pulls_only: bool = False
 
 
 class Solved(Record):

@@ -55,6 +55,9 @@ NEARLY = 1e-5
 """Below this merit a step is taken whole: Newton's method ends there by itself; rounding could hide its progress."""
 FAR = 1e-2
 """From a merit above this, no step of Newton's method gets to the end: the next matrix is made with the residual."""
+BOLD_STEPS = 40
+"""Where tensions are kept above zero, so many Newton steps are taken whole: each finds out which segments are slack,
+and the residual falls at once when all are found."""
 SMALLEST_SEGMENT = 1e-9
 """The growing segment never gets shorter than this while iterating. [m]"""
 
@@ -130,6 +133,7 @@ def _solve_softly(
     not converge from it, solve from a prediction; if that fails, with a slack law that is sharpened in stages.
     """
     w = backward_weights(step, line.ends.previous_step)
+    line.ends.solver.bold_steps = 0
     if (
         again
         and follow_tow(line, tow)
@@ -137,6 +141,12 @@ def _solve_softly(
         and not _takes_up(line, drum)
     ):
         return True
+    if line.ends.solver.pulls_only:
+        _predict(line, step, tow, water, c, drum, work)
+        line.ends.solver.bold_steps = BOLD_STEPS
+        if solve_step(line, w, c, drum, work, False):
+            return True
+        line.ends.solver.bold_steps = 0
     _predict(line, step, tow, water, c, drum, work)
     if solve_step(line, w, c, drum, work, False):
         return True
@@ -210,11 +220,13 @@ def solve_step(
     differs from run to run, which shows in sensitivities by differences. The residual alone shows whether a guess is
     good enough.
     """
+    if c.retardation > 0.0:
+        line.ends.solver.rounding = 1.0 + c.retardation * w.a0
     rounding, alone = ROUNDING * (c.mass + c.added_mass) * w.a0 * w.b0, has_residual(line, c)
     made = not near
     _residual(line, w, c, drum, work, near)
     merit = _merit(line)
-    for iteration in range(MAX_ITERATIONS):
+    for iteration in range(MAX_ITERATIONS + line.ends.solver.bold_steps):
         # `merit` decides on the length of a Newton step, `size`, in tolerances, on convergence.
         size = _size(line, rounding, merit)
         if size <= 1.0:
@@ -233,9 +245,11 @@ def solve_step(
             merit = _merit(line)
             # A residual has to fall by enough, and NaN never does; below `NEARLY` rounding decides, so any is
             # accepted.
-            if isfinite(merit) and merit <= max(before * (1.0 - 0.1 * fraction), NEARLY):
+            bold = line.ends.solver.bold_steps > 0
+            if isfinite(merit) and (bold or merit <= max(before * (1.0 - 0.1 * fraction), NEARLY)):
                 break
             fraction *= 0.5
+        line.ends.solver.bold_steps = max(line.ends.solver.bold_steps - 1, 0)
         if not isfinite(merit):
             break
     size = _size(line, rounding, merit)
@@ -266,10 +280,17 @@ def save_guess(line: Line) -> float:
 
 @compiled
 def go_from_guess(line: Line, last_length: float, fraction: float) -> None:
-    """Write guess minus `fraction` of the Newton step to level NEW."""
+    """Write guess minus `fraction` of the Newton step to level NEW.
+
+    Where a stiff cable comes taut or slack, a Newton step takes every segment as taut, and has those that are not push,
+    with more than all that pulls. With `pulls_only` they are taken at zero instead, where they find that they are
+    slack; else the residual of what pushes lets no step be long.
+    """
     N, held, guess, step = line.ends.count, held_node(line), line.rows[GUESS], line.rows[STEP]
     for j in range(1, N + 1):
         line.tension[NEW, j] = guess[j, 0] - fraction * step[j, 0]
+        if line.ends.solver.pulls_only and line.tension[NEW, j] < 0.0:
+            line.tension[NEW, j] = 0.0
         if j < held:
             for i in range(3):
                 line.position[NEW, j, i] = guess[j, 1 + i] - fraction * step[j, 1 + i]
@@ -292,7 +313,7 @@ def _tolerances(line: Line, rounding: float) -> tuple[float, float]:
         reach = max(reach, abs(x[NEW, j, 0]), abs(x[NEW, j, 1]), abs(x[NEW, j, 2]))
     # Lengths are differences of coordinates, so the rounding of large coordinates limits their accuracy.
     known = 2.0 * ROUNDING / STRAIN_SCALE * reach / max(line.length[1], SMALLEST_SEGMENT)
-    strain = line.ends.solver.tolerance + known
+    strain = line.ends.solver.tolerance + known * line.ends.solver.rounding
     return strain, line.ends.solver.tolerance * tension + ABSOLUTE_TOLERANCE + rounding * line.length[
         1
     ] * reach

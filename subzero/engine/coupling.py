@@ -7,7 +7,8 @@ the cable is solved for the place to which that takes the tow point; F_{n+1} is 
 
 Newton's method solves it, with the cable's own ∂F/∂x (`cable.moving_end.time_step.impedance`) and the hull's ∂x/∂F
 = (h²/2) A, A the inverse mass at the tow point, corrected by how the hull gave way in the exchanges before: mostly, two
-evaluations do. An exchange that does not converge is tried again in halves.
+evaluations do. An exchange that does not converge is tried again in halves; one in which a cable comes taut is taken in
+parts that follow it (`_follow_snaps`).
 
 The exchange is of second order, and stable for a cable of any weight. A loose one (the force of the step before) is not
 for a cable heavier than the vehicle; nor is a force that goes linearly from F_n to F_{n+1}: a heavy cable then answers
@@ -22,7 +23,7 @@ from cable.drum_motion import lead_drum
 from cable.moving_end import accept, energy_flow, impedance, in_water, try_step
 from subzero.engine.energy import book, take_jolt_of_motion
 from subzero.engine.external_wrench import tow_point
-from subzero.engine.run_state import Live, Now, Setup
+from subzero.engine.run_state import IMPULSE, OVERLOAD, PEAK, Fixed, Live, Now, Setup
 from subzero.engine.vehicle_step import advance_hull, follow_track
 from subzero.jit import compiled, inlined, inner, scratch
 from vehicle import STATE_SIZE
@@ -34,6 +35,12 @@ NOTABLE = 0.01
 """Smaller forces need agree no closer than this one does: where a slack cable floats near a drifting vehicle,
 exchanges hardly make its ten thousandths of a newton agree to six digits of themselves. [N]"""
 MOST_HALVINGS = 8
+LAG = 1e-3
+"""Where a cable comes taut, exchanges are shortened until the speed of the tow point errs by less in each. [m/s]"""
+WAVE_SHARE = 0.25
+"""They get no shorter than this share of the time of a stretch wave, see `shortest_part`, … [-]"""
+MORE_HALVINGS = 6
+"""… unless Newton's method on a cable between slack and taut finds nothing: then up to so many times. [-]"""
 FASTEST = 50.0
 """Speed beyond which a run is stopped as absurd. [m/s]"""
 
@@ -43,10 +50,12 @@ FINE, CABLE_FAILED, DISAGREED, ABSURD = range(4)
 
 @inner
 def exchange(setup: Setup, live: Live, start: float, span: float) -> int:
-    """Take one exchange from `start`, in halves where needed; the live state moves on only as far as it went well."""
-    done, step = 0.0, span
+    """Take one exchange from `start`, in parts where needed; the live state moves on only as far as it went well."""
     if setup.fixed.prescribed and setup.fixed.tethered:
         take_jolt_of_motion(setup, live, start)
+    if setup.fixed.snaps:
+        return _follow_snaps(setup, live, start, span)
+    done, step = 0.0, span
     while True:
         last = done + step >= span * (1.0 - 1e-9)
         # A failed try may have let the drum go or stopped it; the next, shorter one must begin from what was true.
@@ -68,12 +77,97 @@ def exchange(setup: Setup, live: Live, start: float, span: float) -> int:
 
 
 @inner
+def _follow_snaps(setup: Setup, live: Live, start: float, span: float) -> int:
+    """Take one exchange in parts that follow the jumps of the pull; the next one goes on with parts as long.
+
+    Where none that is short enough has a solution, the next longer one that has is taken as it is.
+    """
+    done, now, finest = 0.0, live.now, min(span * 0.5**MOST_HALVINGS, shortest_part(setup, live))
+    is_stuck = False
+    while True:
+        left = span - done
+        step = left / np.ceil(left / min(now.pace, left) - 1e-9)  # evenly, so that the last one is not tiny
+        mode = live.line.ends.drum_mode
+        ending = _agree(setup, live, start + done, step)
+        lag = unforeseen_speed(now, live.line.ends.tow.force, step) if ending == FINE else np.inf
+        if ending == FINE and (lag <= LAG or step <= 2.0 * finest or is_stuck):
+            _accept(setup, live, start + done, step)
+            _note_tug(now, step, setup.fixed)
+            done, is_stuck = done + step, False
+            now.pace = 2.0 * step if 8.0 * lag <= LAG else step  # the lag grows with the cube of the step
+            if now.pace > span:
+                now.pace = np.inf
+            if done >= span * (1.0 - 1e-9):
+                return FINE
+            continue
+        live.line.ends.drum_mode = mode
+        now.pace = (2.0 if is_stuck else 0.5) * step
+        if is_stuck and step >= left:
+            return ending
+        if now.pace < finest * 0.5**MORE_HALVINGS:
+            is_stuck, now.pace = True, finest
+
+
+@compiled
+def _note_tug(now: Now, span: float, fixed: Fixed) -> None:
+    """Enter an accepted part of length `span` [s] in the peak and the impulse since the last row.
+
+    Within it the pull goes in a straight line. That of a joint means nothing when it comes taut: its impulse does.
+    """
+    first, last, strength = _size(now.force_before), _size(now.force), fixed.strength
+    now.tug[IMPULSE] += 0.5 * span * (first + last)
+    if fixed.joint:
+        return
+    now.tug[PEAK] = max(now.tug[PEAK], last)
+    if last > strength:
+        now.tug[OVERLOAD] += span * (last - strength) / (last - min(first, strength))
+    elif first > strength:
+        now.tug[OVERLOAD] += span * (first - strength) / (first - last)
+
+
+@inlined
+def _size(F: np.ndarray) -> float:
+    """Return |F|. [N]."""
+    return np.sqrt(F[0] * F[0] + F[1] * F[1] + F[2] * F[2])
+
+
+@inlined
+def shortest_part(setup: Setup, live: Live) -> float:
+    """Return a share of L/2c, the time in which a stretch wave, c = √(EA/m), runs along half of the cable. [s].
+
+    A pull cannot come to the vehicle's notice faster than that. Infinite for a cable that does not stretch.
+    """
+    c = setup.fixed.cable
+    return (
+        WAVE_SHARE * 0.5 * live.now.length * np.sqrt(c.mass * c.compliance) if c.compliance > 0.0 else np.inf
+    )
+
+
+@compiled
+def unforeseen_speed(now: Now, F: np.ndarray, span: float) -> float:
+    """Return by how much an exchange may err in the speed of the tow point: ½h |A ΔF|. [m/s].
+
+    ΔF is what the pull ended with other than straight on from the exchange before. The pull within an exchange is a
+    straight line, so its impulse errs by ½h ΔF at most.
+    """
+    ratio = span / now.last_step if now.last_step > 0.0 else 0.0
+    A, R, square = now.mobility, now.hull.rotation, 0.0
+    for i in range(3):
+        speed = 0.0
+        for k in range(3):
+            for m in range(3):
+                speed += A[i, k] * R[m, k] * (F[m] - _straight_on(now, ratio, m))
+        square += speed * speed
+    return 0.5 * span * np.sqrt(square)
+
+
+@inner
 def hull_steps(setup: Setup, span: float) -> int:
     """Return how many hull steps an exchange takes."""
     return max(1, int(np.ceil(span / setup.fixed.hull_step - 1e-6)))
 
 
-@inlined
+@inner
 def _agree(setup: Setup, live: Live, start: float, span: float) -> int:
     """Find the force at the end of an exchange with which hull and cable agree; nothing is made real yet."""
     # First guess: the force goes on with the slope of the exchange before, and bends as it did there.
@@ -264,7 +358,7 @@ def _solve_three(M: np.ndarray, b: np.ndarray) -> None:
         b[k] /= M[k, k]
 
 
-@inlined
+@inner
 def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
     """Make the exchange real: state, forces, cable, energies."""
     steps = hull_steps(setup, span)

@@ -28,6 +28,7 @@ from cable.moving_end import (
     STORED,
     STRAINED,
     TOWED,
+    damping_loss,
     energy_flow,
     take_jolt,
 )
@@ -54,6 +55,8 @@ def book(setup: Setup, live: Live, start: float, span: float, steps: int) -> Non
     else:
         _book_hull(setup, live, start, span, steps)
     total[CABLE_LOSS] += half * (old[LOSS] + new[LOSS])
+    if setup.fixed.snaps:
+        total[CABLE_LOSS] += damping_loss(old, new, span)
     total[DRUM] += half * (old[AT_DRUM] + new[AT_DRUM])
     total[ADDED] += half * (old[ADDED_MASS] + new[ADDED_MASS] + old[STRAINED] + new[STRAINED])
     total[ADDED] += span * new[CARRIED]

@@ -15,12 +15,16 @@ import numpy as np
 
 from cable.moving_end import NOW, paid_out
 from subzero.engine.external_wrench import row_at, sample_current, tow_wrench
-from subzero.engine.run_state import Live, Setup
+from subzero.engine.run_state import IMPULSE, OVERLOAD, PEAK, Live, Now, Setup
 from subzero.jit import compiled
 from vehicle import BREAKDOWN, STATE_SIZE, battery_voltage, breakdown, deflections, euler_angles
 
 BREATH_S = 0.1
 """Compiled code computes for about so long before Python moves the progress bar and handles an interrupt. [s]"""
+TUG, TUG_SIZE = 4, 3
+"""First column of `Now.tug` in the trace, and how many there are."""
+SNAP_SHARE = 0.1
+"""A pull lasts as long as it is, on average from one result to the next, more than this share of the strongest. [-]"""
 MOST_QUICKER = 2.0
 """So many times as many rows are filled at a time as the last time, at most: with more cable, later ones take longer.
 [-]"""
@@ -30,8 +34,8 @@ class Recording(NamedTuple):
     """The rows of a run, filled up to some row.
 
     Attributes:
-        trace: force of the cable on the hull, body axes [N], and number of nodes at every time of the run, of rows that
-            are not kept, too (times, 4).
+        trace: force of the cable on the hull, body axes [N], number of nodes, and `Now.tug` since the time before, at
+            every time of the run, of rows that are not kept, too (times, 7).
         state: (n, STATE_SIZE), as in `vehicle.STATE`.
         attitude: roll, pitch, heading (n, 3). [rad]
         rotation: R_nb (n, 3, 3).
@@ -88,6 +92,32 @@ class Run:
     all_times: np.ndarray = field(default_factory=lambda: np.zeros(0))
     completed: bool
     message: str
+
+    @property
+    def snap(self) -> dict[str, float]:
+        """How hard the cable pulled between the results, of a run whose cable can come taut; else empty.
+
+        peak_tension_N, and when, time_of_peak_s, within the time between two results; impulse_N_s ∫|F|dt of the
+        strongest pull, from when it begins until it is over; time_above_strength_s of all the run. Exchanges follow a
+        snap with steps of their own, so the peak is not missed between samples. A cable that does not stretch has an
+        impulse only: what it pulls with when it comes taut is a force only as far as one says in what time.
+        """
+        tug = self.recording.trace[:, TUG:]
+        if self.all_times.size < 2 or tug.shape != (self.all_times.size, TUG_SIZE) or not tug.any():
+            return {}
+        mean, peak = tug[1:, IMPULSE] / np.diff(self.all_times), int(tug[:, PEAK].argmax())
+        low, strongest = np.flatnonzero(mean < SNAP_SHARE * mean.max()), int(mean.argmax())
+        first = low[low < strongest].max(initial=-1) + 1
+        last = low[low > strongest].min(initial=mean.size)
+        impulse = {"impulse_N_s": float(tug[1 + first : 1 + last, IMPULSE].sum())}
+        if not tug[peak, PEAK] > 0.0:
+            return impulse
+        return {
+            "peak_tension_N": float(tug[peak, PEAK]),
+            "time_of_peak_s": float(self.all_times[peak]),
+            **impulse,
+            "time_above_strength_s": float(tug[:, OVERLOAD].sum()),
+        }
 
 
 class Grid(NamedTuple):
@@ -150,7 +180,7 @@ class Pace:
 def new_recording(rows: int, nodes: int, times: int = 0) -> Recording:
     """Return an empty recording of `rows` rows, with space for `nodes` nodes in all, and a trace of `times` times."""
     shapes = {
-        "trace": (times, 4),
+        "trace": (times, TUG + TUG_SIZE),
         "state": (rows, STATE_SIZE),
         "attitude": (rows, 3),
         "rotation": (rows, 3, 3),
@@ -224,11 +254,14 @@ def _record_cable(live: Live, r: Recording, row: int, used: int, m1: float) -> i
 
 
 @compiled
-def note(recording: Recording, row: int, time: int) -> None:
+def note(recording: Recording, row: int, time: int, now: Now) -> None:
     """Enter a row that was just written in the trace, as that of time number `time`; if there is a trace."""
     if time < recording.trace.shape[0]:
         for i in range(3):
             recording.trace[time, i] = recording.wrench[row, i]
+        for i in range(TUG_SIZE):
+            recording.trace[time, TUG + i] = now.tug[i]
+            now.tug[i] = 0.0
         recording.trace[time, 3] = recording.nodes[row]
 
 

@@ -29,6 +29,10 @@ PLACE, SLOPE, KNOT_ROWS = 1, 7, 13
 """Rows of a smooth one (13, n), after that of time: x, y, z [m], φ, θ, ψ [rad], and the rate of each of them."""
 
 
+PEAK, IMPULSE, OVERLOAD = range(3)
+"""Places in `Now.tug`: largest pull [N], its impulse ∫|F|dt [N s], and how long it was above the strength [s]."""
+
+
 class HullWork(Record):
     """Work space of the hull: rotation R_nb, pull of the cable in earth axes and its wrench, the water around it."""
 
@@ -61,7 +65,9 @@ class Fixed(Record):
 
     `drum_place` is the drum at the start, earth axes (3,) [m]; hull and cable agree when their forces differ by less
     than the fraction `agreement`; energies are summed up if the run is `booked`; the model is `lacking` if something is
-    to be added to it, see `Setup`.
+    to be added to it, see `Setup`. `strength` is the load that the cable may carry, infinite if not known [N].
+    The cable `snaps` if it can come taut against the vehicle: a winch holds its length. (A drum that turns gives cable
+    when it is pulled.) It is a `joint` if it does not stretch, too.
     """
 
     vehicle: VehicleNumbers
@@ -71,10 +77,13 @@ class Fixed(Record):
     drum_place: np.ndarray
     hull_step: float
     agreement: float
+    strength: float
     tethered: bool
     prescribed: bool
     booked: bool
     lacking: bool
+    snaps: bool
+    joint: bool
 
 
 class Now(Record):
@@ -91,6 +100,8 @@ class Now(Record):
         tow_before: the same for the guess before (3,). [m]
         mobility: acceleration of the tow point per pull, body axes, as the last exchanges showed it (3, 3). [1/kg]
         last_step: length of the last accepted exchange, 0 at the start. [s]
+        pace: length of an exchange that follows the jumps of the pull; infinite where it does not jump. [s]
+        tug: how hard the cable pulled since the last row, rows as in `PEAK` (3,).
         iterations: of Newton's method on the cable, since the start.
         length: of the cable in the water, at the last accepted time, 0 without a cable. [m]
         hull: work space.
@@ -107,6 +118,8 @@ class Now(Record):
     Z: np.ndarray
     mobility: np.ndarray
     last_step: float
+    pace: float
+    tug: np.ndarray
     iterations: int
     length: float
     hull: HullWork

@@ -60,7 +60,7 @@ def run_rows(
             return at, used, ending
         row = row_of(at, stride)
         after = record_row(setup, live, recording, row, times[at], used)
-        note(recording, row, at)
+        note(recording, row, at, live.now)
         if at % stride == 0:  # the row is kept; else the next one is written over it
             used = after
     return last, used, FINE

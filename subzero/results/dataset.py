@@ -309,6 +309,7 @@ def _closure_error(run: Run, values: dict[str, np.ndarray], model: Model) -> np.
 def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) -> dict[str, Any]:
     """Return the provenance of the result; no clock, so that two runs are alike to the last bit."""
     motion = trial.motion
+    snap = run.snap
     return {
         "scenario": trial.name,
         "title": printable(trial.description),
@@ -326,6 +327,7 @@ def _provenance(trial: scenarios.Trial, model: Model, tethered: bool, run: Run) 
         "sea_bed_m": trial.sea_bed,
         "outcome": "completed" if run.completed else "stopped",
         "outcome_message": run.message,
+        **({"snap": json.dumps(snap)} if snap else {}),
     }
 
 

@@ -50,6 +50,7 @@ def summarise(run: AnyRun) -> dict[str, Any]:
         "time_of_largest_cable_force_s": number(time[pull]),
         "largest_cable_moment_N_m": number(moment[twist]),
         "time_of_largest_cable_moment_s": number(time[twist]),
+        **({"snap": json.loads(run.attrs["snap"])} if "snap" in run.attrs else {}),
         "energy": energy_balance(run),
         "diagnostics": diagnostics(run),
         "thinned": run.attrs.get("thinned"),

@@ -96,7 +96,8 @@ def show_warnings(runs: dict[str, Summary], console: Console) -> None:
 def number_groups(summary: Summary, *, whole: bool = True) -> list[list[Row]]:
     """Return the main results, runs side by side: rows in groups, each a row's words and a cell for each run."""
     runs = [summary[label] for label in RUNS if label in summary]
-    first = _rows(bool(summary["prescribed"])).items()
+    snaps = [run["snap"] for run in runs if "snap" in run]
+    first = _rows(bool(summary["prescribed"]), snaps).items()
     groups: list[list[Row]] = [[(words, *map(cell, runs)) for words, cell in first]]
     if all(run["energy"] is not None for run in runs):
         groups.append(_energy_rows([run["energy"] for run in runs]))
@@ -118,8 +119,8 @@ def _runs_table(summary: Summary, whole: bool) -> Table:
     return table
 
 
-def _rows(is_prescribed: bool) -> dict[str, Callable[[Summary], str]]:
-    """Return the rows of the table: words → how to read the cell from a summary."""
+def _rows(is_prescribed: bool, snaps: list[Summary]) -> dict[str, Callable[[Summary], str]]:
+    """Return the rows of the table: words → how to read the cell from a summary; `snaps` are those of the runs."""
     rows: dict[str, Callable[[Summary], str]] = {
         "outcome": lambda run: f"{run['outcome']}, {run['time_at_end_s']:g} s",
         "warnings": lambda run: str(len(run["warnings"])),
@@ -134,7 +135,17 @@ def _rows(is_prescribed: bool) -> dict[str, Callable[[Summary], str]]:
     }
     if is_prescribed:
         del rows["peak speed [m/s]"]
+    if snaps:
+        rows["peak tension, between results too [N]"] = lambda run: _snap(run, "peak_tension_N", 4)
+        rows["impulse of the strongest pull [N s]"] = lambda run: _snap(run, "impulse_N_s", 4)
+    if any(snap.get("time_above_strength_s") for snap in snaps):
+        rows["time above the cable's strength [s]"] = lambda run: _snap(run, "time_above_strength_s", 3)
     return rows
+
+
+def _snap(run: Summary, name: str, digits: int) -> str:
+    """Return a number of the snap of a run; nothing for a run whose cable cannot snap."""
+    return _plain(run.get("snap", {}).get(name), digits)
 
 
 def _largest(run: Summary, what: str, unit: str) -> str:

@@ -21,6 +21,10 @@ least two seconds of it. It is counted in nodes times iterations, not by a clock
 numbers on every machine. A run of an ill-posed problem takes ever more iterations as it is refined, so the budget ends
 its refinement soon; then the last change is the error, and the run says that it is not resolved.
 
+Where the cable comes taut between two samples (`_in_snap`), a force at a sample says how far a snap is at that instant,
+which a shift by a millisecond changes by tens of newtons. There the largest pulls around the sample are compared, which
+the exchanges follow with steps of their own (`subzero.engine.coupling`).
+
 That looks at the whole error, of segments, steps, slack and coupling alike, which an estimate inside a step does not: a
 cable that is bent sharply near the drum errs in its segments only, and its steps look perfect.
 """
@@ -37,7 +41,7 @@ import numpy as np
 
 import scenarios
 from scenarios import ScenarioError
-from subzero.engine.recording import Grid
+from subzero.engine.recording import TUG, Grid
 from subzero.errors import UserError
 
 if TYPE_CHECKING:
@@ -54,6 +58,8 @@ BUDGET_RATIO, LEAST_BUDGET_S = 10.0, 2.0
 START_ROWS, START_REFINEMENTS = 5, (4, 2)
 """Samples that belong to the start, and how much finer these are taken to see their error: half as fine where a run of
 a stiff cable does not get so far. [-]"""
+SNAP_OVERSHOOT = 0.03
+"""The cable snaps where its pull between samples is above that at the samples by this share of its largest. [-]"""
 SMALLEST_FORCE = 1e-6
 """Forces are compared with at least this: smaller ones have no meaning. [N]"""
 
@@ -345,13 +351,55 @@ def _change(run: Run, fine: Run, first: int, largest: float) -> Change:
         return Change(size=0.0, time=0.0)
     gap = fine.recording.trace[rows[here], :3] - run.recording.trace[here, :3]
     size = np.linalg.norm(gap, axis=1)
+    snaps, pulls = _in_snap(run, fine, rows, here)
+    size = np.where(snaps, pulls, size)
     worst = int(np.argmax(size))
     return Change(size=float(size[worst]) / largest, time=float(run.all_times[here][worst]))
 
 
+def _in_snap(run: Run, fine: Run, rows: np.ndarray, here: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return which of the common samples are in a snap, and by how much the pulls between samples differ there. [N].
+
+    One is, if next to it the pull gets larger than at that sample, by `SNAP_OVERSHOOT`. The largest pull in an interval
+    of the one run is held against that of the other in it and in its two neighbours, and the other way round: a snap
+    may be a little sooner or later, but has to be as strong.
+
+    Args:
+        run: a run.
+        fine: a finer one.
+        rows: rows of the finer run at the samples of the other.
+        here: which of these are common.
+    """
+    pulls = _between(run), _between(fine)
+    nowhere = np.zeros(int(here.sum()), np.bool_), np.zeros(int(here.sum()))
+    if not (pulls[0].any() or pulls[1].any()):
+        return nowhere
+    cuts = np.minimum(np.concatenate([[0], rows[:-1] + 1]), fine.all_times.size - 1)
+    coarse, other = pulls[0], np.maximum.reduceat(pulls[1], cuts)
+    sampled = np.linalg.norm(run.recording.trace[:, :3], axis=1)
+    over = np.maximum(coarse, other) > sampled + SNAP_OVERSHOOT * max(coarse.max(), other.max())
+    gap = np.maximum(coarse - _around(other, np.max), other - _around(coarse, np.max))
+    snaps, gaps = _around(over, np.max), np.maximum(_around(gap, np.max), 0.0)
+    return snaps[here], gaps[here]
+
+
+def _between(run: Run) -> np.ndarray:
+    """Return the largest pull since the time before, of all times of a run; zeros where it is not known. [N]."""
+    trace = run.recording.trace
+    pulls: np.ndarray = trace[:, TUG] if trace.shape[1] > TUG else np.zeros(trace.shape[0])
+    return pulls
+
+
+def _around(values: np.ndarray, reduce: Callable[..., np.ndarray]) -> np.ndarray:
+    """Return the largest, or what `reduce` says, of every value and its two neighbours."""
+    wide = np.pad(values, 1, mode="edge")
+    return reduce([wide[:-2], wide[1:-1], wide[2:]], axis=0)
+
+
 def _largest(run: Run) -> float:
-    """Return the largest force of a run, but at least `SMALLEST_FORCE`. [N]."""
-    return max(float(np.linalg.norm(run.recording.trace[:, :3], axis=1).max()), SMALLEST_FORCE)
+    """Return the largest force of a run, between its samples too, but at least `SMALLEST_FORCE`. [N]."""
+    sampled = np.linalg.norm(run.recording.trace[:, :3], axis=1)
+    return max(float(sampled.max()), float(_between(run).max()), SMALLEST_FORCE)
 
 
 def _mean_nodes(run: Run) -> float:

@@ -5,6 +5,7 @@ Also the words for when and for how long, which all warnings share.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -118,6 +119,13 @@ def strength(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     if most <= 0.0 or not run.attrs["tethered"]:
         return []
     time, T = run["time"].values, np.nan_to_num(run["cable_node_tension"].values).max(axis=1)
+    snap = json.loads(run.attrs.get("snap", "{}"))
+    if snap.get("peak_tension_N", 0.0) > max(most, float(T.max())):
+        return [
+            f"The cable snaps taut with {snap['peak_tension_N']:.4g} N by {snap['time_of_peak_s']:g} s, and may carry "
+            f"{most:g} N (cable.strength; above it for {snap['time_above_strength_s']:.3g} s): a real one might part. "
+            "Go slower, or take a stronger cable, or one that stretches more."
+        ]
     if T.max() <= most:
         return []
     worst, since = int(T.argmax()), first_time(time, most < T)

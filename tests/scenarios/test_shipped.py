@@ -112,6 +112,7 @@ def test_the_cable_is_table_1_and_the_drum_that_of_section_4():
         "tangential_drag_coefficient": 0.01,
         "normal_drag_coefficient": 1.0,
         "compliance": 0.0,
+        "internal_damping": 0.0,
         "bending_stiffness": 0.0,
         "strength": 0.0,
         "minimum_bend_radius": 0.0,
