@@ -385,8 +385,8 @@ def _commented(some: list[Module]) -> float:
     return 100.0 * sum(module.comments for module in some) / max(lines, 1)
 
 
-ENGINE = r"subzero\.diagnosis\b(?!\.hypothesis\.catalogue|\.report)"
-"""Modules of the diagnosis without those that are words or tables."""
+ENGINE = r"subzero\.diagnosis\b(?!\.hypothesis\.catalogue|\.report|\.vehicle_model)"
+"""Modules of the diagnosis without those that are words, tables, or serve another engine."""
 
 
 def engine_goals(every: dict[str, Module]) -> list[Goal]:

@@ -129,10 +129,10 @@ def _simulate(
             if any(values):
                 setting = effect.apply(setting, *values)
         for effect in effects.values():
-            begun = p.get(effect.id, {})
-            values = [begun.get(_name(effect, each), 0.0) for each in effect.parameters]
+            from_then_on = p.get(effect.id, {})
+            values = [from_then_on.get(_name(effect, each), 0.0) for each in effect.parameters]
             if any(values):
-                setting = with_onset(effect, begun["since"]).apply(setting, *values)
+                setting = with_onset(effect, from_then_on["since"]).apply(setting, *values)
         force = np.column_stack([u.get(axis, np.zeros(t.size)) for axis in AXES])
         if force.any():
             missing = MissingForce(time=tuple(t.tolist()), wrench=tuple(map(tuple, force.tolist())))

@@ -15,7 +15,7 @@ w         unknown inputs at their knots                           as the input m
 e         residual: record, corrected, less the simulation        channel's    problem
 Σ         covariance of the noise of a channel: white and slow    channel's²   noise
 log p(y)  evidence of an explanation                              1            fit
-R         what is left, over the sensor's level                   1            nearness
+R         residual of the best explanation over the sensor's level  1            nearness
 
 Reading order: `model`, `record`, `explanation`, `problem`, `fit`, `search`, `nearness`, `locks`, `verdict`.
 """

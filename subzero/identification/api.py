@@ -59,23 +59,23 @@ def diagnose(
 
     Args:
         records: one or several, which share all numbers of the model but the states at their beginnings.
-        model: what is known.
-        held_out: records that no fit sees, for the gain of what is named. Without them each of several records is
+        model: the function and its declarations.
+        held_out: records that no fit sees, for the gain of a term. Without them each of several records is
             predicted by a fit of the others, or the last part of a single one by a fit of the first.
-        progress: called with the share that is done, and what is being done.
+        progress: called with the share that is done, and the present step.
 
     Raises:
         UserError: a record cannot be used.
         ModelError: the model cannot be used.
     """
-    tell = progress or (lambda share, words: None)
+    report = progress or (lambda share, words: None)
     given = [records] if isinstance(records, Record) else list(records)
     kept = [held_out] if isinstance(held_out, Record) else list(held_out)
     with threadpool_limits(limits=1, user_api="blas"):  # matrices are small
         problem = Problem(model, given)
-        search = Search(problem, tell)
+        search = Search(problem, report)
         search.run()
-        tell(0.9, "locks")
+        report(0.9, "locks")
         return _concluded(search, kept)
 
 
@@ -215,7 +215,7 @@ def _relations(problem: Problem, ranked: Sequence[Fit], probabilities: np.ndarra
             )
         if said and not _decided(ranked, probabilities, (a, b)):
             found.append(
-                f"{a} and {b} differ {', and '.join(said)}. Which of them is wrong these records cannot tell."
+                f"{a} and {b} differ {', and '.join(said)}. These records do not decide which of them is wrong."
             )
     return found
 
@@ -278,7 +278,7 @@ def _budget(search: Search, best: Fit) -> tuple[Share, ...]:
 
 
 def _remainder(problem: Problem, best: Fit, near: Nearness) -> str:
-    """Return where what stays acts, and with what it grows."""
+    """Return where the remainder acts, and with which channel or input it grows."""
     if near.near or not problem.model.unknown:
         return ""
     name = max(near.sizes, key=lambda each: near.sizes[each][0] / near.sizes[each][1])
@@ -305,7 +305,7 @@ def _remainder(problem: Problem, best: Fit, near: Nearness) -> str:
         if abs(strongest[0]) > 0.5
         else ""
     )
-    return f"What stays acts on {name}{words}."
+    return f"The remainder acts on {name}{words}."
 
 
 def _on_grid(record: Record, name: str) -> np.ndarray:
@@ -315,7 +315,7 @@ def _on_grid(record: Record, name: str) -> np.ndarray:
 
 
 def _visible_from(search: Search) -> dict[str, str]:
-    """Return error or cause → the size from which on it would be seen, beside "nothing is wrong".
+    """Return error or cause → the size from which on it would be seen, if nothing else is wrong.
 
     The odds of a term with the prior N(0, s²) exceed SEEN_ODDS where x² ≥ 2 σ² (log(odds/prior odds) + log(s/σ)).
     """

@@ -28,7 +28,7 @@ ROUNDS, STEPS = 20, 3
 PATIENCE = 2
 """Rounds without a gain that end a fit: the evidence of a linear problem falls now and then on the way."""
 TEMPER, APPROACHING = 0.3, 0.03
-"""Noise on the way from afar, over what is left; a smaller share gained of every channel ends it. [-]"""
+"""Noise on the way from afar, over the residual; a smaller share gained of every channel ends it. [-]"""
 ENOUGH = 0.05
 """A step that gains less log posterior ends them. [nats]"""
 SIZE_RANGE = (-5.0, 6.0)
@@ -287,7 +287,7 @@ def fit(problem: Problem, terms: Terms, start: Mapping[Entry, float], levels: Le
 
 
 def free_fit(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> Fit:
-    """Return the fit of an explanation in free simulation: unknown inputs are 0, and what is left is the noise.
+    """Return the fit of an explanation in free simulation: unknown inputs are 0, and the residual is the noise.
 
     It says how well an explanation predicts, where `fit` says how probable it is.
     """
@@ -312,7 +312,7 @@ def free_fit(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> Fi
 
 
 def _left(problem: Problem, linear: Linear) -> dict[str, float]:
-    """Return channel → root mean square of what is left."""
+    """Return channel → root mean square of the residual."""
     return {
         name: float(np.sqrt(np.mean(e[problem.used(name, linear.terms)] ** 2)))
         for name, e in linear.e.items()
@@ -322,8 +322,8 @@ def _left(problem: Problem, linear: Linear) -> dict[str, float]:
 def _approached(problem: Problem, linear: Linear) -> Linear:
     """Return a problem linearised nearer to the records, where it is far from them.
 
-    The noise is taken to be a share of what is left, so that a step stays where the linear problem holds; it shrinks
-    with what is left (graduated optimisation).
+    The noise is taken to be a share of the residual, so that a step remains where the linear problem holds; it shrinks
+    with the residual (graduated optimisation).
     """
     for _ in range(ROUNDS):
         left = _left(problem, linear)

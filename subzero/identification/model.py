@@ -1,4 +1,4 @@
-"""A model as a value: a function, and what is known of its channels, parameters, causes and unknown inputs.
+"""A model as a value: a function, and its declared channels, parameters, causes and unknown inputs.
 
 def spring(p, u, t):
     ...                                    # any code; returns {channel: values at t}
@@ -200,7 +200,7 @@ class Cause:
 
 @dataclass(frozen=True)
 class Unknown:
-    """An input that nobody knows: where it acts, how large it usually is, and how quickly it changes.
+    """An input that is not known: where it acts, how large it usually is, and how quickly it changes.
 
     The function finds it in ``u[name]``; of "command:pump", added to ``u["pump"]``. It is 0 but for a Gaussian process,
     which is part of every explanation.
@@ -230,7 +230,7 @@ class Model:
         inputs: names of the inputs that it reads from a record.
         parameters: its numbers, and the states at the beginning of a record.
         causes: what may be wrong.
-        unknown: inputs that nobody knows.
+        unknown: inputs that are not known.
         tuned_on: parameter → channels through which it was tuned: an error of such a channel moves the parameter.
         batch: whether it computes many sets at once: numbers are (k,), inputs (n, 1) or (n, k), readings (n, k).
     """

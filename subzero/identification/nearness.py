@@ -1,7 +1,7 @@
 """Is the model near at all? For each channel what the best explanation leaves; how large the unknown inputs have to be;
 how far it bends what it does not name.
 
-    R = rms(what is left) / level of the sensor     after the unknown inputs, and in a free simulation without them
+    R = rms(residual) / level of the sensor     after the unknown inputs, and in a free simulation without them
     size / declared size                            of every unknown input
     |θ − c| / τ                                     of every parameter that no term names
 
@@ -19,7 +19,7 @@ from subzero.identification.fit import Fit
 from subzero.identification.problem import Problem
 
 NEAR_LEFT = 1.4
-"""Largest ratio of what is left, after the unknown inputs, to the most that a sensor errs. [-]"""
+"""Largest ratio of the residual, after the unknown inputs, to the most that a sensor errs. [-]"""
 NEAR_SIZE = 3.0
 """Largest ratio of an unknown input's size to the declared one. [-]"""
 NEAR_BEND = 4.0

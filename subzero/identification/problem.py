@@ -31,7 +31,7 @@ CORRECTIONS = ("offset", "gain", "drift", "delay")
 """Entries that change the record, not the simulation."""
 
 Progress = Callable[[float, str], None]
-"""(share that is done, what is being done)."""
+"""(share that is done, present step)."""
 
 
 @dataclass(frozen=True, eq=False)

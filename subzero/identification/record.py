@@ -56,7 +56,7 @@ class Record:
         return self.times.get(channel, self.time)
 
     def between(self, start: float, end: float) -> Record:
-        """Return the record until a time, with the readings before another left out; inputs stay. [s]
+        """Return the record until a time, with the readings before another left out; inputs are kept. [s]
 
         A simulation begins at the beginning, so the inputs before `start` are needed.
         """

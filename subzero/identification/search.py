@@ -44,7 +44,7 @@ class Search:
 
     Attributes:
         problem: records and model.
-        progress: told of every fit.
+        progress: called before every fit.
         fits: explanation → its best fit.
         complete: whether it came to its end.
     """

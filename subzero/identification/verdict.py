@@ -1,4 +1,4 @@
-"""The verdict: what is near, what is named and why, what cannot be told; as text, as JSON, as a picture."""
+"""The verdict: how near the model is, which terms are named and why, which are not; as text, JSON, and a picture."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ class Verdict:
         explanations: ids of the terms → probability, the most probable first.
         relations: what all probable explanations have in common, in sentences.
         budget: what each term of the best explanation takes.
-        remainder: what stays, in words.
+        remainder: where the rest acts, in words.
         visible_from: error or cause → the size from which on it would be seen.
         notes: what was done to the records.
         curves: to be drawn.
@@ -162,14 +162,14 @@ class Verdict:
         return f"<pre>{escape(str(self))}</pre>"
 
     def to_json(self) -> str:
-        """Return the verdict as JSON, without the curves; what is infinite or not known as null."""
+        """Return the verdict as JSON, without the curves; infinite numbers as null."""
         found = {
             f.name: _plain(getattr(self, f.name)) for f in dataclasses.fields(self) if f.name != "curves"
         }
         return json.dumps(found, indent=2, allow_nan=False)
 
     def plot(self) -> Any:
-        """Return a figure: each channel of each record, measured and in free simulation, and what is left."""
+        """Return a figure: each channel of each record, measured and in free simulation, and the residual."""
         import matplotlib.pyplot as plt
 
         figure, axes = plt.subplots(
