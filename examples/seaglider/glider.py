@@ -45,10 +45,10 @@ def glider(p, u, t):
 
 
 def model(*, second=True, trusted=False):
-    """Return the model. Noise is what a path that is smooth within a minute leaves of each gauge."""
-    channels = {"gauge": sd.Sensor(noise=0.2, unit="dbar", logger="glider")}
+    """Return the model. Noise is what a path that is smooth within half a minute leaves of each gauge."""
+    channels = {"gauge": sd.Sensor(noise=0.3, unit="dbar", logger="glider")}
     if second:
-        channels["ad2cp"] = sd.Sensor(noise=0.4, unit="dbar", trusted=trusted, logger="ad2cp")
+        channels["ad2cp"] = sd.Sensor(noise=0.5, unit="dbar", trusted=trusted, logger="ad2cp")
     return sd.Model(
         glider,
         channels,
@@ -64,7 +64,7 @@ def model(*, second=True, trusted=False):
             sd.Cause("buoyancy", "the buoyancy is off", changes={"volume": 50.0}),
             sd.Cause("pitch", "the pitch sensor has an offset", changes={"pitch_bias": 2.0}),
         ],
-        unknown=[sd.Unknown("vertical_speed", size=0.02, time=40.0)],
+        unknown=[sd.Unknown("vertical_speed", size=0.02, time=30.0)],
         tuned_on={"drag": ["gauge"], "volume": ["gauge"]},
         batch=True,
     )

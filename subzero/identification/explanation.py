@@ -235,7 +235,7 @@ def data_terms(model: Model) -> list[Term]:
             )
             for factor, offset, words in known
         ]
-    if len(suspects) > 1 and len(suspects) == len(model.channels):
+    if len(suspects) > 2 and len(suspects) == len(model.channels):  # of two, the delay of one says it
         sentence = "all channels are late or early, or the inputs early or late"
         found.append(Term(f"delay:{CLOCK}", sentence, "delay", CLOCK, PRIOR_DATA / 5.0))
     return found

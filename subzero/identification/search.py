@@ -24,6 +24,8 @@ WITHIN = 5.0
 """Explanations within this of the best are expanded, too. [nats]"""
 WORTH = 1.0
 """A term that is ranked to gain less is not fitted. [nats]"""
+TWINS = ("offset", "scale", "affine", "delay")
+"""Errors that another channel of the unit may have in the place of the first one."""
 MOST_FITS = 60
 """The search ends after so many fits, and says so."""
 
@@ -101,6 +103,26 @@ class Search:
             smaller = self._fit(without(base.terms, term), base.linear)
             for linear in self._best_additions(smaller.linear):
                 self._fit(linear.terms, linear)
+            for twin in self._twins(term):
+                self._fit(with_term(smaller.terms, twin), base.linear)
+
+    def _twins(self, term: Term) -> Iterator[Term]:
+        """Yield the same error, undone, of other channels of its unit: two gauges differ, and either may be wrong."""
+        if term.kind not in TWINS or term.target not in self.problem.channels:
+            return
+        sensors = self.problem.model.channels
+        for name in self.problem.channels:
+            alike = sensors[name].unit == sensors[term.target].unit
+            if name != term.target and alike and not sensors[name].trusted:
+                yield replace(
+                    term,
+                    id=term.id.replace(term.target, name, 1),
+                    sentence=term.sentence.replace(term.target, name, 1),
+                    target=name,
+                    factor=1.0 / term.factor,
+                    offset=-term.offset / term.factor,
+                    size=-term.size,
+                )
 
     def _fit(self, terms: Terms, start: Linear) -> Fit:
         """Return the fit of an explanation; it is fitted from each start only once."""

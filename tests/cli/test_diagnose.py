@@ -19,13 +19,17 @@ from subzero.diagnosis import (
     CAUSE_NAMED,
     NOTHING_WRONG,
     OUTSIDE,
-    Cause,
     Curves,
     Detectability,
     Estimate,
     Extended,
-    Unknown,
     Verdict,
+)
+from subzero.diagnosis import (
+    NamedCause as Cause,
+)
+from subzero.diagnosis import (
+    UnknownForce as Unknown,
 )
 
 TIME = np.arange(0.0, 10.01, 0.1)

@@ -20,13 +20,17 @@ from subzero.diagnosis import (
     NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
-    Cause,
     Curves,
     Misfit,
     Rival,
-    Unknown,
     Verdict,
     report,
+)
+from subzero.diagnosis import (
+    NamedCause as Cause,
+)
+from subzero.diagnosis import (
+    UnknownForce as Unknown,
 )
 from subzero.figures.diagnosis import draw_diagnosis, evidence
 from subzero.figures.style import BLUE, Title

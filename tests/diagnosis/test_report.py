@@ -20,7 +20,6 @@ from subzero.diagnosis import (
     NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
-    Cause,
     ChannelGain,
     Curves,
     Detectability,
@@ -31,9 +30,14 @@ from subzero.diagnosis import (
     Misfit,
     NextTrial,
     Rival,
-    Unknown,
     Verdict,
     report,
+)
+from subzero.diagnosis import (
+    NamedCause as Cause,
+)
+from subzero.diagnosis import (
+    UnknownForce as Unknown,
 )
 from subzero.diagnosis.assessment import detectability
 from subzero.figures.diagnosis import draw_diagnosis

@@ -23,7 +23,6 @@ from subzero.diagnosis import (
     DATA_ERROR,
     OUTSIDE,
     UNDECIDED,
-    Cause,
     Curves,
     Estimate,
     Extended,
@@ -32,10 +31,15 @@ from subzero.diagnosis import (
     Misfit,
     Rival,
     Setting,
-    Unknown,
     Verdict,
     all_effects,
     apply_extended,
+)
+from subzero.diagnosis import (
+    NamedCause as Cause,
+)
+from subzero.diagnosis import (
+    UnknownForce as Unknown,
 )
 from subzero.figures.diagnosis import draw_diagnosis
 from subzero.figures.style import Title
