@@ -39,9 +39,9 @@ KEY = re.compile(r"""\s*("[^"]*"|'[^']*'|[\w.\-]+)\s*=""")
 AT = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Source:
-    """A parsed TOML file that can say on which line a key stands.
+    """A parsed TOML file that can say on which line a key stands; the same text gives the same object again.
 
     Attributes:
         name: the file as the user named it.
