@@ -10,6 +10,7 @@ import os
 import re
 import tomllib
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -38,15 +39,15 @@ KEY = re.compile(r"""\s*("[^"]*"|'[^']*'|[\w.\-]+)\s*=""")
 AT = re.compile(r"\s*\(at (?:line (\d+), column (\d+)|end of document)\)$")
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Source:
-    """A parsed TOML file that can say on which line a key stands.
+    """A parsed TOML file that can say on which line a key stands; the same text gives the same object again.
 
     Attributes:
         name: the file as the user named it.
         folder: folder that holds it, from which its own paths start.
         text: its text.
-        table: the same, parsed.
+        table: the same, parsed; not to be changed, as it is kept for the next reader.
         lines: dotted key → line, from 1.
     """
 
@@ -127,7 +128,12 @@ def read_toml(path: Path, name: str) -> Source:
     Raises:
         ScenarioError: it cannot be read, or is not TOML; with line and column.
     """
-    text, name = read_text(path, name), printable(name)
+    return _parsed(printable(name), path.parent, read_text(path, name))
+
+
+@lru_cache(maxsize=8)
+def _parsed(name: str, folder: Path, text: str) -> Source:
+    """Return a TOML file with this text, one of the last few that were read: a trial read again is parsed once."""
     if LONG_KEY.search(text):
         why = f"it has a key of more than {2 * MOST_LEVELS} names with dots between"
         raise ScenarioError([Problem(file=name, why=why, remedy="Two names are enough.")])
@@ -141,7 +147,7 @@ def read_toml(path: Path, name: str) -> Source:
     if _keys(table) > MOST_KEYS:
         why = f"it has more than {MOST_KEYS} keys"
         raise ScenarioError([Problem(file=name, why=why, remedy="Remove those that say nothing here.")])
-    return Source(name=name, folder=path.parent, text=text, table=table, lines=_key_lines(text))
+    return Source(name=name, folder=folder, text=text, table=table, lines=_key_lines(text))
 
 
 def _is_deep(table: dict[str, Any]) -> bool:

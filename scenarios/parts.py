@@ -21,7 +21,7 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from typing import Any
 
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
@@ -95,10 +95,15 @@ def read_part(source: Source, kind: str, named: str) -> tuple[Part, list[Problem
         remedy = nearest_or_all(named, shipped(folder)) + " Or give the path of a file that ends in .toml."
         return Part(), [source.problem(kind, f"we ship no such {kind}", remedy, found=named)]
     try:
-        part = read_toml(path, named)
-        values, problems = _checked(part, pattern(kind))
+        return _part_of(read_toml(path, named), kind)
     except ScenarioError as error:
         return Part(), list(error.problems)
+
+
+@lru_cache(maxsize=4)
+def _part_of(part: Source, kind: str) -> tuple[Part, list[Problem]]:
+    """Return the vehicle or the cable of a file, one of the last few that were read, and its problems."""
+    values, problems = _checked(part, pattern(kind))
     said = (
         {}
         if problems

@@ -17,7 +17,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from itertools import chain, repeat
+from itertools import chain
 from math import cos, degrees, pi, radians, sin
 from typing import Any
 
@@ -60,6 +60,13 @@ LIMITS = {
 """The observed channels, in this order, with the limits of the observation space."""
 TRUTH = ("wanted_heading", *Observation._fields)
 """The contents of an info: the reference heading [rad], and the true values."""
+NAMES = (*TRUTH, *(f"_{name}" for name in TRUTH))
+"""The same of many environments: in arrays, and that each environment has it."""
+HEADING = Observation._fields.index("heading")
+FELT = [
+    Observation._fields.index(name) for name in ("yaw_rate", "surge_speed", "rudder_angle", "cable_length")
+]
+"""Places of true values that are observed as they are."""
 
 
 class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
@@ -96,7 +103,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         low, high = np.array(list(LIMITS.values()), dtype=np.float32).T
         self.observation_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,), dtype=np.float32)
-        self._wanted, self._taken, self.seen = 0.0, 0, self._sim.observation
+        self._wanted, self._taken = 0.0, 0
 
     @checked_arguments
     def reset(
@@ -106,8 +113,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         super().reset(seed=None if seed is None else whole("TetheredHeading.reset: seed", seed))
         drawn = self.np_random.uniform(-LARGEST_TURN, LARGEST_TURN)
         turn = checked("TetheredHeading.reset", "turn", (options or {}).get("turn", drawn), unit="rad")
-        self.seen = self._sim.reset()
-        self._wanted = self.seen.heading + turn
+        self._wanted = self._sim.reset().heading + turn
         self._taken = 0
         return self._observed(), self._info()
 
@@ -115,7 +121,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         """Hold the rudder for one sample time."""
         (share,) = _shares(action, 1)
         stopped = self.hold(share)
-        return self._observed(), self.reward(share), stopped, self.is_over, self._info()
+        return self._observed(), self.reward(self._error, share), stopped, self.is_over, self._info()
 
     def render(self) -> Any:
         """Return the way, the cable, the tow point and the wanted heading from above (height, width, 3), or None."""
@@ -146,15 +152,15 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
     def hold(self, share: float) -> bool:
         """Hold the rudder at a share of its limit for one sample time; return whether the simulation stopped."""
         try:
-            self.seen, stopped = self._sim.step((self._propeller, self._most * share, 0.0, 0.0)), False
+            self._sim.hold(self._propeller, self._most * share + 0.0, 0.0, 0.0)  # + 0.0: no negative zero
+            stopped = False
         except RunStoppedError:
-            self.seen, stopped = self._sim.observation, True
+            stopped = True
         self._taken += 1
         return stopped
 
-    def reward(self, share: float) -> float:
-        """Return the reward of the last sample time, in which the rudder was held at that share of its limit."""
-        error = self._wanted - self.seen.heading
+    def reward(self, error: float, share: float) -> float:
+        """Return the reward of a sample time: heading error at its end [rad], rudder as a share of its limit."""
         return -(error**2 + RUDDER_PRICE * share**2) * self._sim.sample_time
 
     @property
@@ -168,24 +174,29 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._taken >= STEPS
 
     @property
-    def felt(self) -> tuple[float, ...]:
-        """The observation of the agent, before it is cut to the limits of its space: the values of `LIMITS`."""
-        error, seen = self._wanted - self.seen.heading, self.seen
-        return (sin(error), cos(error), seen.yaw_rate, seen.surge_speed, seen.rudder_angle, seen.cable_length)
+    def seen(self) -> Observation:
+        """The true values now."""
+        return self._sim.observation
 
     @property
-    def truth(self) -> tuple[float, ...]:
-        """The values of `TRUTH`."""
-        return (self._wanted, *self.seen)
+    def truth(self) -> tuple[np.ndarray, float]:
+        """The true values of `Observation`, which the next step writes over, and the wanted heading [rad]."""
+        return self._sim.seen, self._wanted
+
+    @property
+    def _error(self) -> float:
+        """How far the heading is from the wanted one. [rad]"""
+        return self._wanted - float(self._sim.seen[HEADING])
 
     def _observed(self) -> np.ndarray:
         """Return the observation of the agent, within the limits of its space."""
         space: Any = self.observation_space
-        return np.clip(np.array(self.felt, dtype=np.float32), space.low, space.high)
+        felt = sin(self._error), cos(self._error), *self._sim.seen[FELT].tolist()
+        return np.clip(np.array(felt, dtype=np.float32), space.low, space.high)
 
     def _info(self) -> dict[str, Any]:
         """Return the whole truth, by name, and the heading that is wanted [rad]."""
-        return dict(zip(TRUTH, self.truth, strict=True))
+        return dict(zip(TRUTH, (self._wanted, *self._sim.seen.tolist()), strict=True))
 
 
 def _shares(actions: Any, count: int) -> list[float]:
@@ -223,43 +234,42 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         if workers is None:
             workers = (os.cpu_count() or 1) if self._ours[0].exchanges >= MANY_EXCHANGES else 1
         threads = min(whole("TetheredHeadings: workers", workers, least=1), num_envs)
-        self._parts = [part.tolist() for part in np.array_split(np.arange(num_envs), threads)]
+        self._mine, *self._others = (part.tolist() for part in np.array_split(np.arange(num_envs), threads))
         self._pool = ThreadPoolExecutor(threads)
-        self._map = map if threads == 1 else self._pool.map
 
     def step(
         self, actions: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold each rudder for one sample time, (num_envs, 1); return the same in arrays as each environment does."""
         rudders = _shares(actions, self.num_envs)
-        parts = self._map(self._held, self._parts, repeat(rudders))
-        rewards, ended = map(np.array, zip(*chain.from_iterable(parts), strict=True))
+        others = [self._pool.submit(self._held, part, rudders) for part in self._others]
+        mine = self._held(self._mine, rudders)
+        ended = np.array([*mine, *chain.from_iterable(other.result() for other in others)])
+        seen, wanted = (np.array(each) for each in zip(*(our.truth for our in self._ours), strict=True))
+        errors = (wanted - seen[:, HEADING]).tolist()
+        rewards = np.array(list(map(self._ours[0].reward, errors, rudders)))
+        rewards[self._autoreset_envs] = 0.0
         cut = np.array([our.is_over for our in self._ours])
         self._autoreset_envs = ended | cut
-        return self._observed(), rewards, ended, cut, self._infos()
+        return self._observed(errors, seen), rewards, ended, cut, self._infos(wanted, seen)
 
-    def _held(self, which: list[int], rudders: list[float]) -> list[tuple[float, bool]]:
-        """Step some environments; return the reward of each, and whether its simulation stopped."""
-        return [self._held_one(self._ours[i], rudders[i], self._autoreset_envs[i]) for i in which]
+    def _held(self, which: list[int], rudders: list[float]) -> list[bool]:
+        """Step some environments, or start them again where an episode is over; return which simulations stopped."""
+        for i in which:
+            if self._autoreset_envs[i]:
+                self._ours[i].reset()
+        return [not self._autoreset_envs[i] and self._ours[i].hold(rudders[i]) for i in which]
 
-    @staticmethod
-    def _held_one(env: TetheredHeading, rudder: float, is_over: bool) -> tuple[float, bool]:
-        """Step one environment, or start it again where its episode is over."""
-        if is_over:
-            env.reset()
-            return 0.0, False
-        stopped = env.hold(rudder)
-        return env.reward(rudder), stopped
-
-    def _observed(self) -> np.ndarray:
+    def _observed(self, errors: list[float], seen: np.ndarray) -> np.ndarray:
         """Return the observations of the agents, within the limits of their space (num_envs, 6)."""
         space: Any = self.observation_space
-        return np.clip(np.array([our.felt for our in self._ours], dtype=np.float32), space.low, space.high)
+        turned = [(sin(error), cos(error)) for error in errors]
+        return np.clip(np.hstack([turned, seen[:, FELT]], dtype=np.float32), space.low, space.high)
 
-    def _infos(self) -> dict[str, Any]:
+    def _infos(self, wanted: np.ndarray, seen: np.ndarray) -> dict[str, Any]:
         """Return the truth of all by name, (num_envs,) each; and by the name with _ before it, that each has it."""
-        values = dict(zip(TRUTH, np.array([our.truth for our in self._ours]).T.copy(), strict=True))
-        return values | {f"_{name}": np.ones(self.num_envs, dtype=bool) for name in TRUTH}
+        known = np.ones((len(TRUTH), self.num_envs), dtype=bool)
+        return dict(zip(NAMES, chain([wanted], seen.T.copy(), known), strict=True))
 
     def close_extras(self, **kwargs: Any) -> None:
         """End the threads."""

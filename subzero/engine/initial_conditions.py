@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from math import degrees
+from typing import Any
 
 import numba
 import numpy as np
@@ -105,7 +106,8 @@ def prepare(
         load=new_load(),
     )
     live.line.ends.solver.pulls_only = setup.fixed.snaps
-    if tethered:
+    if tethered and setup.fixed.dtype not in _seen_before:
+        _seen_before.add(setup.fixed.dtype)
         compile_in_parallel(lambda: _needed_last(setup, live))
     live.now.length = wet if tethered else 0.0
     layout = live.line.ends.layout
@@ -118,6 +120,10 @@ def prepare(
     elif setup.fixed.drum.control != FREE:
         _hang(live.line, float(live.now.guess[2] * setup.fixed.cable.weight))
     return setup, live
+
+
+_seen_before: set[Any] = set()
+"""Types of the constants of tethered runs so far: to name the functions that each needs takes longer than some runs."""
 
 
 def _needed_last(setup: Setup, live: Live) -> list[Call]:

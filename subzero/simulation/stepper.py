@@ -144,6 +144,11 @@ class Simulator:
         return Observation(*self._held.seen.tolist())
 
     @property
+    def seen(self) -> np.ndarray:
+        """The observation as an array (27,), in SI units; the next step writes over it."""
+        return self._held.seen
+
+    @property
     def time(self) -> float:
         """Time since the start [s]."""
         return float(self._held.seen[0])
@@ -159,9 +164,15 @@ class Simulator:
             CommandError: the command is not four finite numbers (a UserError); the run stands where it was.
             RunStoppedError: the simulation cannot go on.
         """
-        n, rudder, port, starboard = (
-            self._command_at(self.time) if command is None else self._checked(command)
-        )
+        self.hold(*(self._command_at(self.time) if command is None else self._checked(command)))
+        return self.observation
+
+    def hold(self, n: float, rudder: float, port: float, starboard: float) -> None:
+        """Hold a command of four finite numbers, not checked here, for one sample time: `step` without observing.
+
+        Raises:
+            RunStoppedError: the simulation cannot go on.
+        """
         self._check_on()
         goal = int(self._held.at[ROW]) + self._exchanges
         if goal >= self._held.times.size:
@@ -175,7 +186,6 @@ class Simulator:
             live, recording = enlarged_run(held.live, held.recording, int(held.at[USED]))
             self._held = Held.of(held.setup, live, recording, held.times, held.at, held.seen)
         self._check_on()
-        return self.observation
 
     def result(self) -> xr.Dataset:
         """Return the run so far as `subzero.simulate` does: channels with units, forces, the cable's shape."""

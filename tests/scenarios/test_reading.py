@@ -210,6 +210,20 @@ def test_loading_twice_gives_the_same_numbers():
     np.testing.assert_array_equal(first.commands.values, second.commands.values)
 
 
+def test_a_trial_that_is_changed_in_place_changes_none_that_is_loaded_later():
+    """Files are parsed once while they are the same: what a reader gets of them is its own."""
+    first = scenarios.load("fig6")
+    first.vehicle["rigid_body"]["mass"] = first.cable["diameter"] = first.drum["radius"] = 0.0
+    again = scenarios.load("fig6")
+    assert min(again.vehicle["rigid_body"]["mass"], again.cable["diameter"], again.drum["radius"]) > 0.0
+
+
+def test_a_file_that_has_been_edited_is_read_again(write):
+    before = scenarios.load(write(SHORT))
+    edited = scenarios.load(write(SHORT + '[changes]\n"cable.diameter" = 0.0123\n'))
+    assert edited.cable["diameter"] == 0.0123 != before.cable["diameter"]
+
+
 def test_names_and_help_do_not_wait_for_the_schema_library():
     use = "scenarios.names(); scenarios.describe('fig6')"
     code = f"import sys, scenarios; {use}; print('pydantic' in sys.modules)"
