@@ -88,11 +88,17 @@ class Search:
             self._expand(base)
 
     def _next(self) -> Fit | None:
-        """Return the best explanation that was not expanded yet, if it is near the best of all."""
+        """Return the best explanation that was not expanded yet, if it is near the best of all, and no part of it is
+        better: what a term more did not gain, two will not.
+        """
         ranked = self.ranked()
         best = self.score(ranked[0])
-        near = [each for each in ranked if self.score(each) > best - WITHIN]
-        return next((each for each in near if key(each.terms) not in self._expanded), None)
+        for i, each in enumerate(ranked):
+            own = set(key(each.terms))
+            simpler = any(set(key(other.terms)) < own for other in ranked[:i])
+            if self.score(each) > best - WITHIN and not simpler and key(each.terms) not in self._expanded:
+                return each
+        return None
 
     def _expand(self, base: Fit) -> None:
         """Fit the best explanations that are one move away."""
