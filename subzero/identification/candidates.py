@@ -28,6 +28,8 @@ FEWEST_STUCK = 10
 """So many equal readings are looked at as a run."""
 STUCK_LEVELS = 5.0
 """... while the simulation changes by so many levels of the sensor."""
+SAME_CLOCK = 0.1
+"""Odds of a delay of a channel that has the times of the inputs, over those of one with a clock of its own. [-]"""
 DELAYS_TRIED = 4
 """Delays up to so many usual ones are tried, in steps of half of one."""
 FEWEST_AFTER = 8
@@ -48,6 +50,13 @@ def declared(problem: Problem) -> list[Term]:
     model = problem.model
     duration = max(float(np.ptp(record.time)) for record in problem.records)
     data = [term for term in data_terms(model) if term.target in (*problem.channels, CLOCK)]
+    own_clock = {name for record in problem.records for name in record.times}
+    data = [
+        replace(term, odds=SAME_CLOCK * term.odds)
+        if term.kind == "delay" and term.target not in own_clock
+        else term
+        for term in data
+    ]
     return [*cause_terms(model, duration), tolerance_term(model), *data]
 
 
