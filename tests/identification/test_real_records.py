@@ -1,7 +1,7 @@
 """Real records with a documented answer: cascaded tanks, and a Seaglider with two pressure gauges.
 
-Configuration: the folders in examples/, with source and licence. Tolerance: as documented (factor 1.094 to 1.104 in dives 2
-to 6), and a gain on records that no fit has seen.
+Configuration: the folders in examples/, with source and licence. Tolerance: as documented (factor 1.094 to 1.104 in
+dives 2 to 6), and a gain on records that no fit has seen.
 """
 
 import importlib.util
