@@ -12,7 +12,7 @@ sentence.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -140,11 +140,6 @@ class Term:
 
 Terms = tuple[Term, ...]
 """An explanation; () is "nothing is wrong"."""
-
-
-def ids(terms: Iterable[Term]) -> tuple[str, ...]:
-    """Return the ids of terms, in alphabetical order."""
-    return tuple(sorted(term.id for term in terms))
 
 
 def with_term(terms: Terms, term: Term) -> Terms:

@@ -244,7 +244,7 @@ def _budget_lines(budget: tuple[Share, ...], remainder: str) -> list[str]:
         return [remainder] if remainder else []
     parts = [f"{share.term} takes {share.before - share.after:.2f}" for share in budget]
     lines = (
-        f"Of {budget[0].before:.2f} levels of the sensors, {', '.join(parts)}; {budget[-1].after:.2f} stay."
+        f"Of {budget[0].before:.2f} levels of the sensors, {', '.join(parts)}; {budget[-1].after:.2f} remain."
     )
     return ["", lines + (f" {remainder}" if remainder else "")]
 

@@ -26,6 +26,8 @@ import numpy as np
 from scipy.special import betaln, gammaln
 
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
+from subzero.identification.noise import gains as gains_of
+from subzero.identification.noise import innovations
 from subzero.jit import compiled, scratch
 
 
@@ -125,34 +127,6 @@ def _as_columns(values: np.ndarray) -> np.ndarray:
     """Return values (m,) as one column, or columns (m, k) as they are; m may be 0."""
     values = np.ascontiguousarray(values, dtype=float)
     return values[:, None] if values.ndim == 1 else values
-
-
-@compiled
-def gains_of(kept: np.ndarray, white: float, slow: float, gain: np.ndarray, scale: np.ndarray) -> None:
-    """Fill the gain of the filter, and the standard deviation of its innovations, at every sample (m,)."""
-    left = slow  # variance of the slow part before the sample is seen
-    for i in range(kept.size):
-        seen = left + white
-        gain[i] = left / seen
-        scale[i] = np.sqrt(seen)
-        # The variance after the update decays to the next sample, and the process adds to it.
-        left = kept[i] * kept[i] * left * (1.0 - gain[i]) + slow * (1.0 - kept[i] * kept[i])
-
-
-@compiled
-def innovations(
-    kept: np.ndarray, gain: np.ndarray, scale: np.ndarray, values: np.ndarray, white: np.ndarray
-) -> None:
-    """Fill the innovation of each value, its difference from the prediction by the values before, over its standard
-    deviation: (m, columns) → the same.
-    """
-    for j in range(values.shape[1]):
-        expected = 0.0
-        for i in range(values.shape[0]):
-            new = values[i, j] - expected
-            white[i, j] = new / scale[i]
-            # The Kalman update, then the decay to the next sample.
-            expected = kept[i] * (expected + gain[i] * new)
 
 
 @compiled
