@@ -15,9 +15,9 @@ from textwrap import shorten
 from typing import Any
 
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
-from scenarios.files import Source, read_toml, shipped, shipped_path
+from scenarios.files import Source, parsed, read_toml, shipped, shipped_path
 from scenarios.parameters import parameter_names, parameter_values, quantity_of
-from scenarios.parts import PATTERNS, Part, leaves, read_changes, read_part
+from scenarios.parts import PATTERNS, Part, leaves, part_of, read_changes, read_part
 from scenarios.quantities import Quantity
 from scenarios.trial import Trial
 from subzero.errors import printable
@@ -32,6 +32,19 @@ FOLDERS = {"trial": "trials", "vehicle": "vehicles", "cable": "cables"}
 """Kind of file → the folder of those that are shipped."""
 
 
+ORIGINS = ("measured", "derived", "guessed")
+"""Where a number comes from: measured or published; from the shape of the vehicle, by a formula; or from judgement."""
+DERIVED, GUESSED = ("geometry formula", "derived"), ("estimate", "none", "convention", "no source")
+"""Beginnings of a source in a file that say so; all others are measured, printed or given."""
+
+
+def origin_of(source: str) -> str:
+    """Return which of `ORIGINS` the source of a number in a vehicle or cable file says."""
+    if source.startswith(DERIVED):
+        return "derived"
+    return "guessed" if source.startswith(GUESSED) or not source else "measured"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Number:
     """A number of a file.
@@ -43,6 +56,7 @@ class Number:
         low: least plausible value; of a trial, the least that is allowed.
         high: greatest.
         source: where the value comes from; of a trial, its meaning.
+        origin: of a vehicle or a cable: one of `ORIGINS`.
     """
 
     name: str
@@ -51,6 +65,7 @@ class Number:
     low: float
     high: float
     source: str
+    origin: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,6 +121,8 @@ def locate(name_or_path: str | Path) -> tuple[str, Source]:
 def _kind_of(source: Source) -> str:
     """Return the kind of a user's file, by the sections that only this kind has."""
     table = source.table
+    if "base" in table:
+        return "vehicle"
     for kind, key, shape in (("vehicle", "hull", dict), ("cable", "drum", dict), ("trial", "vehicle", str)):
         if isinstance(table.get(key), shape):
             return kind
@@ -136,6 +153,19 @@ def contents(name_or_path: str | Path, trial: Trial | None = None) -> Contents:
     )
 
 
+def contents_of_text(kind: str, name: str, text: str) -> Contents:
+    """Return the contents of a vehicle or a cable that is not written yet; nothing is.
+
+    Raises:
+        ScenarioError: with all its problems.
+    """
+    part, problems = part_of(parsed(name, Path(), text), kind)
+    if problems:
+        raise ScenarioError(problems)
+    said = first_sentence(text)
+    return Contents(kind=kind, name=name, description=said, numbers=tuple(_of_part(kind, part)), parts={})
+
+
 def read_whole(kind: str, source: Source) -> Part:
     """Return the vehicle or cable in a file.
 
@@ -162,6 +192,7 @@ def _of_part(kind: str, part: Part) -> Iterator[Number]:
             low=float(low),
             high=float(high),
             source=str(leaf.get("source", "")),
+            origin=origin_of(str(leaf.get("source", ""))),
         )
 
 

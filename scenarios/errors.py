@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 from subzero.errors import SHOWN_CHARACTERS, UserError, printable
 
-SHOWN_PROBLEMS = 40
-"""So many problems are spelt out in a message: enough to repair a file; more would only repeat themselves."""
+SHOWN_PROBLEMS = 10
+"""So many problems are spelt out in a message: enough to go on with; more would only repeat themselves."""
 
 
 @dataclass(frozen=True, kw_only=True)

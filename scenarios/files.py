@@ -128,11 +128,11 @@ def read_toml(path: Path, name: str) -> Source:
     Raises:
         ScenarioError: it cannot be read, or is not TOML; with line and column.
     """
-    return _parsed(printable(name), path.parent, read_text(path, name))
+    return parsed(printable(name), path.parent, read_text(path, name))
 
 
 @lru_cache(maxsize=8)
-def _parsed(name: str, folder: Path, text: str) -> Source:
+def parsed(name: str, folder: Path, text: str) -> Source:
     """Return a TOML file with this text, one of the last few that were read: a trial read again is parsed once."""
     if LONG_KEY.search(text):
         why = f"it has a key of more than {2 * MOST_LEVELS} names with dots between"

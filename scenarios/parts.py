@@ -20,12 +20,14 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, lru_cache
 from typing import Any
 
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source, read_toml, shipped, shipped_path
+from scenarios.similar_vehicle import BASE, complete
+from scenarios.similar_vehicle import SECTION as KNOWN
 from subzero.errors import short as shown
 
 PATTERNS = {"vehicle": ("vehicles", "subzero2"), "cable": ("cables", "table1")}
@@ -34,6 +36,9 @@ PATTERNS = {"vehicle": ("vehicles", "subzero2"), "cable": ("cables", "table1")}
 LEAF_KEYS = ("value", "unit", "range", "tolerance", "limits", "source")
 
 SERVOS = ("rudder_servo", "stern_plane_port_servo", "stern_plane_starboard_servo")
+FEW = 5
+"""So many missing numbers are named one by one; more are one problem, as the file has hardly begun."""
+
 OPTIONAL = {
     "cable.internal_damping": 0.0,
     "cable.bending_stiffness": 0.0,
@@ -95,14 +100,16 @@ def read_part(source: Source, kind: str, named: str) -> tuple[Part, list[Problem
         remedy = nearest_or_all(named, shipped(folder)) + " Or give the path of a file that ends in .toml."
         return Part(), [source.problem(kind, f"we ship no such {kind}", remedy, found=named)]
     try:
-        return _part_of(read_toml(path, named), kind)
+        return part_of(read_toml(path, named), kind)
     except ScenarioError as error:
         return Part(), list(error.problems)
 
 
 @lru_cache(maxsize=4)
-def _part_of(part: Source, kind: str) -> tuple[Part, list[Problem]]:
+def part_of(part: Source, kind: str) -> tuple[Part, list[Problem]]:
     """Return the vehicle or the cable of a file, one of the last few that were read, and its problems."""
+    if kind == "vehicle" and BASE in part.table:
+        part = _completed(part)
     values, problems = _checked(part, pattern(kind))
     said = (
         {}
@@ -113,6 +120,23 @@ def _part_of(part: Source, kind: str) -> tuple[Part, list[Problem]]:
     return Part(source=part, values=values, tolerances=tolerances, complete=not problems), problems
 
 
+def _completed(part: Source) -> Source:
+    """Return a vehicle file that names a base, with all numbers that follow from it.
+
+    Raises:
+        ScenarioError: a base that is not shipped, and what `scenarios.similar_vehicle` refuses.
+    """
+    named, known = part.table[BASE], shipped(PATTERNS["vehicle"][0])
+    if not isinstance(named, str) or named not in known:
+        remedy = nearest_or_all(str(named), known)
+        raise ScenarioError([part.problem(BASE, "we ship no such vehicle", remedy, found=named)])
+    base, problems = part_of(read_toml(shipped_path(PATTERNS["vehicle"][0], named), named), "vehicle")
+    if problems or base.source is None:
+        raise ScenarioError(problems)
+    own = {key: inside for key, inside in part.table.items() if key not in (BASE, KNOWN)}
+    return complete(part, dict(leaves(base.source.table)), dict(leaves(own)))
+
+
 def _checked(source: Source, model: Source) -> tuple[dict[str, float], list[Problem]]:
     """Return the values of a file, held against its pattern."""
     wanted, given = dict(leaves(model.table)), dict(leaves(source.table))
@@ -121,20 +145,34 @@ def _checked(source: Source, model: Source) -> tuple[dict[str, float], list[Prob
         for key in given
         if key not in wanted
     ]
-    values = {}
+    values, missing = {}, []
     for key, leaf in wanted.items():
         if key not in given and key in OPTIONAL:
             values[key] = OPTIONAL[key]
         elif key not in given:
-            why = "this key is missing"
-            problems.append(
-                source.problem(key, why, f'Add it as {{ value = ..., unit = "{leaf["unit"]}" }}.')
+            missing.append(
+                source.problem(
+                    key, "this key is missing", f'Add it as {{ value = ..., unit = "{leaf["unit"]}" }}.'
+                )
             )
         elif complaint := _complaint(given[key], leaf, key):
             problems.append(source.problem(key, *complaint, found=given[key].get("value")))
         else:
             values[key] = float(given[key]["value"])
-    return values, problems
+    return values, (missing if len(missing) <= FEW else [_incomplete(source, model, missing)]) + problems
+
+
+def _incomplete(source: Source, model: Source, missing: list[Problem]) -> Problem:
+    """Return one problem for a file that has hardly begun: how many numbers are missing, and how to begin."""
+    kind = "vehicle" if model is pattern("vehicle") else "cable"
+    bases = " or ".join(f'"{name}"' for name in ("torpedo", *sorted(set(shipped("vehicles")) - {"torpedo"})))
+    remedy = f"Begin with a whole one: subzero new my_{kind}.toml --like {model.name}."
+    if kind == "vehicle":
+        remedy = (
+            f"Write base = {bases} at the top: all others then follow from what you know (docs/vehicles.md)."
+        )
+    why = f"{len(missing)} of the {len(dict(leaves(model.table)))} numbers of a {kind} are missing"
+    return replace(missing[0], line=None, key="", why=why, remedy=remedy)
 
 
 def leaves(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Leaf]]:

@@ -180,6 +180,22 @@ depth_m         | m      | -100   | 11000 | 0 | depth of the hull centre, positi
 )
 
 
+KNOWN = _read("""
+length_m            | m     | 0.05   | 50    | 0 | length over all
+diameter_m          | m     | 0.01   | 10    | 0 | largest diameter
+mass_kg             | kg    | 0.01   | 1e6   | 0 | mass with everything inside
+net_buoyancy_N      | N     | -1e5   | 1e5   | 0 | buoyancy minus weight
+speed_m_s           | m/s   | 0.01   | 20    | 0 | speed straight ahead, at propeller_rps if that is known
+propeller_rps       | rev/s | 0.01   | 200   | 0 | command of the propeller at speed_m_s
+propeller_diameter_m | m    | 0.005  | 5     | 0 | diameter of the propeller
+fin_area_m2         | m2    | 1e-5   | 10    | 0 | plan area of one exposed fin; rudders and stern-planes alike
+fin_station_m       | m     | -50    | 50    | 0 | centre of pressure of the fins, forward of the hull centre
+tow_station_m       | m     | -50    | 50    | 0 | tow point, forward of the hull centre
+water_density_kg_m3 | kg/m3 | 900    | 1100  | 0 | density of the water that it is ballasted for
+""")
+"""What a vehicle file may say of a vehicle that is like a shipped one: `scenarios.similar_vehicle`."""
+
+
 def by_field(quantities: tuple[Quantity, ...]) -> dict[str, Quantity]:
     """Return quantities by the names of the fields that hold them, ``hull_step_s`` → ``hull_step``."""
     suffixes = {"1": "", "m/s": "_m_s", "degree": "_deg", "degree/s": "_deg_s", "rev/s": "_rps"}

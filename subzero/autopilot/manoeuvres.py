@@ -26,12 +26,18 @@ from subzero.model import Model, load, model_of
 from subzero.simulation.run import Progress
 from subzero.steady_motion.hull_state_space import INPUT_NAMES
 from subzero.steady_motion.trim import trim
+from subzero.steady_motion.trim_point import NoTrimError, held_speeds
 
 if TYPE_CHECKING:
     import xarray as xr
 
 RUN_IN = 12.0
 """How long the straight run before a manoeuvre lasts. [s]"""
+
+USUAL_SPEED = 1.0
+"""Of the bare hull in the straight run. [m/s]"""
+SPARE = 1.25
+"""A hull that needs a faster flow gets so much more than the least that holds it level: room for its fins. [-]"""
 
 Command = tuple[float, float, float, float]
 
@@ -242,7 +248,7 @@ def manoeuvre(
     scenario: str | scenarios.Trial = "fig6",
     *,
     size: float | None = None,
-    speed: float = 1.0,
+    speed: float | None = None,
     tethered: bool = True,
     model: Model | None = None,
     progress: Progress | None = None,
@@ -254,7 +260,8 @@ def manoeuvre(
         scenario: whose vehicle, cable and start; its commands are not used.
         size: rudder or planes [degree], or the share of the propeller speed of a crash stop; by default the table's, as
             far as the fins go.
-        speed: of the bare hull in the straight run, which the propeller is set for. [m/s]
+        speed: of the bare hull in the straight run, which the propeller is set for; by default `USUAL_SPEED`, or more
+            if the hull needs more to be held level. [m/s]
         tethered: with the cable.
         model: another model than the scenario's.
         progress: called with the fraction that is done.
@@ -265,6 +272,7 @@ def manoeuvre(
     line = chosen(MANOEUVRES, name, "manoeuvre")
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     model = model_of(trial, model)
+    speed = usual_speed(model) if speed is None else speed
     inner = _checked_size(line, min(line.size, _largest(line, model)) if size is None else size, model)
     straight = tuple(trim(model, speed=speed).command.tolist())
     program = line.program(straight=straight, size=inner, name=name, sample_time=trial.cable_step)
@@ -272,6 +280,19 @@ def manoeuvre(
     run = fly(begin, program, lambda t: _NOTHING, tethered=tethered, model=model, progress=progress)
     run = run.drop_vars(["wanted_speed", "wanted_heading", "wanted_depth"])
     return run, line.measure(_inner(run), inner)
+
+
+def usual_speed(model: Model) -> float:
+    """Return the speed that manoeuvres are flown at: `USUAL_SPEED` where the hull holds it, else what it holds. [m/s]
+
+    Fins that are small for the net buoyancy, or for the reaction torque of the propeller, need a faster flow.
+    """
+    try:
+        trim(model, speed=USUAL_SPEED)
+    except NoTrimError:
+        slowest, most = held_speeds(model)
+        return min(SPARE * slowest, most) if slowest > USUAL_SPEED else most or USUAL_SPEED
+    return USUAL_SPEED
 
 
 _NOTHING = Wanted(float("nan"), float("nan"))

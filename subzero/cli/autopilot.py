@@ -81,7 +81,8 @@ def manoeuvre(
     *,
     rudder: float | None = None,
     planes: float | None = None,
-    speed: float = 1.0,
+    speed: float | None = None,
+    vehicle: str | None = None,
     out: Path | None = None,
     output_mode: StrictOutputMode = NOT_STRICT,
 ) -> int:
@@ -92,7 +93,8 @@ def manoeuvre(
         scenario: whose vehicle, cable and start: a name (see "subzero list") or a path.
         rudder: size of a manoeuvre with the rudder, in degrees.
         planes: size of a manoeuvre with the stern-planes, in degrees.
-        speed: of the bare hull before it, in m/s.
+        speed: of the bare hull before it, in m/s; by default 1, or more if the hull needs more to be held level.
+        vehicle: another vehicle than the scenario's: a name of "subzero list --vehicles", or the path of a file.
         out: folder for the files; by default one named after the manoeuvre, here.
         output_mode: the form of the output.
     """
@@ -101,9 +103,13 @@ def manoeuvre(
     from subzero.autopilot.manoeuvres import manoeuvre as run
 
     size = _size(name, rudder, planes)
+    if vehicle is not None:
+        from scenarios.parameters import with_vehicle
+
+        trial = with_vehicle(trial, vehicle)[0]
 
     def fly(label: str, progress: Progress) -> tuple[xr.Dataset, dict[str, float]]:
-        return run(name, scenario, size=size, speed=speed, tethered=label == "tethered", progress=progress)
+        return run(name, trial, size=size, speed=speed, tethered=label == "tethered", progress=progress)
 
     meaning = f": {MANOEUVRES[name].meaning}" if name in MANOEUVRES else ""
     shown = MANOEUVRE_COMMANDS.get(name, ("heading", "rudder_command"))

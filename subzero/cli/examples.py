@@ -12,7 +12,10 @@ import cyclopts
 
 EXAMPLES = {
     "list": ("subzero list", "subzero list --vehicles --cables"),
-    "new": ("subzero new my_trial.toml", "subzero new my_vehicle.toml --like remus100"),
+    "new": (
+        "subzero new my_trial.toml",
+        "subzero new auv.toml --torpedo length=2.0 diameter=0.2 mass=45 speed=1.8",
+    ),
     "show": ("subzero show fig6", "subzero show subzero2"),
     "validate": ("subzero validate my_trial.toml", "subzero validate record.csv"),
     "simulate": ("subzero simulate fig6", "subzero simulate my_trial.toml --untethered --out here"),
@@ -22,7 +25,10 @@ EXAMPLES = {
         "subzero plot fig6/tethered.nc --what heading --format svg",
     ),
     "explore": ("subzero explore fig6", "subzero explore my_trial.toml --port 9000 --no-browser"),
-    "manoeuvre": ("subzero manoeuvre zigzag", "subzero manoeuvre turning_circle fig6 --rudder 10"),
+    "manoeuvre": (
+        "subzero manoeuvre zigzag",
+        "subzero manoeuvre turning_circle --vehicle remus100 --rudder 10",
+    ),
     "autopilot": (
         "subzero autopilot heading_step",
         "subzero autopilot depth_step fig6 --autopilot lqr --feed-forward model",

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from scenarios.contents import Contents, Number
 
 Flag = Annotated[bool, Parameter(negative=())]
+Words = Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative=())]
 FINE = 0
 COMMANDS_COLUMN = "propeller_rps"
 """A CSV file with this column holds commands; any other is a measured record."""
@@ -52,17 +53,29 @@ def list_shipped(*, vehicles: Flag = False, cables: Flag = False, output_mode: O
     return FINE
 
 
-def new(path: Path, /, *, like: str = "fig6", output_mode: OutputMode = PLAIN) -> int:
-    """Make a file of your own to begin with: a copy of a shipped scenario, vehicle or cable, every key explained.
+def new(
+    path: Path,
+    /,
+    *,
+    like: str = "fig6",
+    torpedo: Words = (),
+    output_mode: OutputMode = PLAIN,
+) -> int:
+    """Make a file of your own to begin with: a copy of a shipped scenario, vehicle or cable, or a vehicle of few
+    numbers; every key explained.
 
     Args:
         path: file to make, such as my_trial.toml; one that exists is left alone.
         like: the file to copy: a name of "subzero list", "subzero list --vehicles" or "subzero list --cables".
+        torpedo: what you know of a torpedo-shaped vehicle, as name=value in SI units: length, diameter, mass, speed,
+            propeller_rps, propeller_diameter, net_buoyancy, fin_area, fin_station, tow_station, water_density.
         output_mode: the form of the output.
     """
     from scenarios.contents import locate
     from subzero.files.read_file import make_toml
 
+    if torpedo:
+        return _new_torpedo(path, list(torpedo), output_mode)
     if like.endswith(".toml"):
         raise UserError(
             f"--like takes the name of something shipped, and {short(like)} is a path. Copy that file itself."
@@ -80,6 +93,31 @@ def new(path: Path, /, *, like: str = "fig6", output_mode: OutputMode = PLAIN) -
     return FINE
 
 
+def _new_torpedo(path: Path, words: list[str], output_mode: OutputMode) -> int:
+    """Write a vehicle of few numbers, once it is known that they make one."""
+    from scenarios.contents import contents_of_text
+    from scenarios.few_numbers import file_text, known_numbers
+    from scenarios.similar_vehicle import speed_command
+    from subzero.files.read_file import make_toml
+
+    known = known_numbers(words)
+    found = contents_of_text("vehicle", str(path), file_text("torpedo", known, "A vehicle."))
+    doubts = _doubts(found)
+    numbers = {number.name.removeprefix("vehicle."): number.values[0] for number in found.numbers}
+    speed = known.get("speed_m_s")
+    command = speed_command(numbers.__getitem__, speed) if speed else None
+    sentence = f"It goes {speed:g} m/s at {command:.1f} rev/s." if command else ""
+    title = f"{path.stem}: a torpedo of {len(known)} known numbers."
+    make_toml(path, file_text("torpedo", known, title, sentence))
+    reported = {"path": printable(str(path)), "kind": "vehicle", "like": "torpedo", "known": known}
+    with output_mode.emit(reported | {"propeller_rps": command, "warnings": doubts}):
+        print(f"Wrote {reported['path']}: a torpedo of {len(known)} known numbers. {sentence}".rstrip())
+        print(*_counted(found), *(f"Warning: {doubt}." for doubt in doubts), sep="\n")
+        print(f"  subzero show {reported['path']}")
+        print(f"  subzero manoeuvre zigzag --vehicle {reported['path']}")
+    return FINE
+
+
 def show(name: str, /, *, output_mode: OutputMode = PLAIN) -> int:
     """Show what a scenario, a vehicle or a cable says: every value with its unit, its range and its source.
 
@@ -94,7 +132,7 @@ def show(name: str, /, *, output_mode: OutputMode = PLAIN) -> int:
         width = shutil.get_terminal_size().columns - 1
         head = f"{found.kind.capitalize()} {found.name}: {found.description}"
         legend = "Each value with its range, and below it what it is."
-        for line in (*textwrap.wrap(head, width), legend, *_lines(found, width)):
+        for line in (*textwrap.wrap(head, width), *_counted(found), legend, *_lines(found, width)):
             print(printable(line))
         for kind, named in found.parts.items():
             print(printable(f"Its {kind} is {named}: subzero show {named}"))
@@ -138,21 +176,21 @@ def _toml(path: Path) -> tuple[str, str]:
         trial = load(path)
         return kind, f"{trial.duration:g} s; {printable(trial.description)}"
     found = contents(path)
-    if kind == "vehicle":
-        _check_vehicle(found)
-    return (
-        kind,
-        f"{len(found.numbers)} numbers, {_count_implausible(found)} outside their own plausible range",
-    )
+    said = f"{len(found.numbers)} numbers, {_count_implausible(found)} outside their own plausible range"
+    doubts = _doubts(found) if kind == "vehicle" else []
+    if doubts:
+        said += "".join(f"\n  Warning: {doubt}." for doubt in doubts)
+    return kind, said
 
 
-def _check_vehicle(found: Contents) -> None:
-    """Raise an error for a vehicle that its own equations refuse."""
+def _doubts(found: Contents) -> list[str]:
+    """Return what contradicts itself in a vehicle; raise an error for one that its own equations refuse."""
     from scenarios.parts import nested
     from vehicle import from_mapping
+    from vehicle.consistency import contradictions
 
     numbers = nested({number.name.removeprefix("vehicle."): number.values[0] for number in found.numbers})
-    from_mapping(numbers)
+    return contradictions(from_mapping(numbers))
 
 
 def _count_implausible(found: Contents) -> int:
@@ -224,12 +262,24 @@ def _lines(found: Contents, width: int) -> Iterator[str]:
         yield f"  {key:<{long}}  {value:>{wide}}  {_span(number)}".rstrip()
         indent = " " * 6
         yield from textwrap.wrap(
-            number.source, max(width, 40), initial_indent=indent, subsequent_indent=indent
+            f"{number.source} [{number.origin}]" if number.origin else number.source,
+            max(width, 40),
+            initial_indent=indent,
+            subsequent_indent=indent,
         )
 
 
 MOST_VALUES = 3
 """So many values of a list are shown."""
+
+
+def _counted(found: Contents) -> list[str]:
+    """Return in a line how many numbers of a vehicle or a cable are measured, derived and guessed."""
+    from scenarios.contents import ORIGINS
+
+    origins = [number.origin for number in found.numbers]
+    said = ", ".join(f"{origins.count(name)} {name}" for name in ORIGINS if name in origins)
+    return [f"{len(origins)} numbers: {said}."] if said else []
 
 
 def _value(number: Number) -> str:

@@ -24,6 +24,7 @@ from subzero.validity.limits import (
     actuators,
     below_sea_bed,
     bend_radius,
+    contradictory_numbers,
     strength,
     unstable_pitch,
 )
@@ -122,6 +123,7 @@ CHECKS: dict[str, Check] = {
     "closure": closure,
     "push": push,
     "slack_shape": slack_shape,
+    "contradictory_numbers": contradictory_numbers,
     "above_surface": above_surface,
     "below_sea_bed": below_sea_bed,
     "strength": strength,

@@ -14,6 +14,7 @@ import numpy as np
 from cable.doubts import ROUNDING
 from subzero.channels import DEGREE, AnyRun
 from subzero.steady_motion.hull_state_space import ACTUATORS, PLACE, STATES, SURGE, ideal, rate
+from vehicle.consistency import contradictions
 
 if TYPE_CHECKING:
     import scenarios
@@ -57,6 +58,15 @@ FINS = {
     "stern_plane_starboard": "stern_plane_starboard_servo",
 }
 """Fin → its servo in the vehicle."""
+
+
+def contradictory_numbers(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
+    """Return warnings of a vehicle whose numbers contradict one another; none where its motion is prescribed."""
+    if run.attrs["prescribed"]:
+        return []
+    found = contradictions(model.vehicle)
+    more = f" (and {len(found) - 1} more: subzero validate lists them)" if len(found) > 1 else ""
+    return [f"Numbers of the vehicle contradict one another: {found[0]}{more}."] if found else []
 
 
 def above_surface(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 import subzero
+from scenarios import Start
+from scenarios.parameters import with_vehicle
 from subzero import autopilot
 from subzero.autopilot import indices
 from subzero.autopilot.manoeuvres import MANOEUVRES, RUN_IN
@@ -187,3 +189,20 @@ def test_a_step_settles_without_a_cable_and_with_one_that_is_fed_forward(name, t
 def test_what_cannot_be_done_is_told(call, words):
     with pytest.raises(subzero.UserError, match=words):
         call()
+
+
+@pytest.mark.parametrize("name", list(MANOEUVRES))
+@pytest.mark.parametrize("vehicle", ["remus100", "auv.toml"])
+def test_other_vehicles_fly_every_manoeuvre_at_a_speed_that_they_hold(tmp_path, name, vehicle):
+    """REMUS 100 needs 1.58 m/s to be held level; a torpedo from four numbers flies at 1 m/s as Subzero does."""
+    if vehicle == "auv.toml":
+        known = "length_m = 2.0\ndiameter_m = 0.2\nmass_kg = 45\nspeed_m_s = 1.8"
+        vehicle = tmp_path / "auv.toml"
+        vehicle.write_text(f'base = "torpedo"\n[known]\n{known}\n')
+    trial = dataclasses.replace(
+        with_vehicle(subzero.load_scenario("fig6"), vehicle)[0], start=Start(depth=20.0)
+    )
+    run, measured = autopilot.manoeuvre(name, trial, tethered=False)
+    assert run.attrs["outcome"] == "completed"
+    assert all(np.isfinite(value) for value in measured.values())
+    assert "contradictory_numbers" not in run.attrs["warnings"]
