@@ -36,7 +36,7 @@ from scenarios.quantities import CONTROLS, SCHEMES
 
 if TYPE_CHECKING:
     from scenarios.instructions import Commands, Motion
-    from scenarios.trial import Profile, Start, Trial, Vessel, Winch
+    from scenarios.trial import Profile, Start, Station, Trial, Vessel, Winch
 
 __all__ = [
     "CONTROLS",
@@ -47,6 +47,7 @@ __all__ = [
     "Profile",
     "ScenarioError",
     "Start",
+    "Station",
     "Trial",
     "Vessel",
     "Winch",
@@ -57,7 +58,7 @@ __all__ = [
 ]
 
 _HOME = dict.fromkeys(("Commands", "Motion"), "scenarios.instructions") | dict.fromkeys(
-    ("Profile", "Start", "Trial", "Vessel", "Winch"), "scenarios.trial"
+    ("Profile", "Start", "Station", "Trial", "Vessel", "Winch"), "scenarios.trial"
 )
 """Name → its module, which needs numpy: fetched when it is first used, so that a command line need not wait for it."""
 

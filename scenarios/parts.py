@@ -18,6 +18,7 @@ The quotes may be left out. The section [tolerances] gives tolerances of such va
 from __future__ import annotations
 
 import math
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -47,6 +48,24 @@ OPTIONAL = {
     **{f"{servo}.{key}": 0.0 for servo in SERVOS for key in ("position_feedback", "lost_command")},
 }
 """Keys of the pattern that a file need not have → the value that is taken then."""
+
+THRUSTER = {
+    **dict.fromkeys(("x", "y", "z"), "m"),
+    **dict.fromkeys(("direction_x", "direction_y", "direction_z"), "1"),
+    **dict.fromkeys(("thrust_ahead", "thrust_astern"), "N"),
+    "curve_exponent": "1",
+    "dead_band": "1",
+    "loss_per_inflow": "kg/s",
+    "reaction_arm": "m",
+    "lag": "s",
+    "lost_command": "1",
+}
+"""Numbers of a thruster, [thrusters.name], and their units; `vehicle.thrusters` has their meaning."""
+OPTIONAL_OF_THRUSTER = {"curve_exponent": 2.0, "dead_band": 0.0, "loss_per_inflow": 0.0, "reaction_arm": 0.0}
+OPTIONAL_OF_THRUSTER |= {"lag": 0.1, "lost_command": 0.0}
+THRUSTER_KEY = re.compile(r"thrusters\.[^.]+\.")
+DERIVATIVE = re.compile(r"derivatives\.[XYZKMN]_(?P<speed>[uvwpqr])(dot|\|?(?P=speed)\|?)?")
+"""``derivatives.X_u``, ``X_uu`` or ``X_u|u|``, ``X_udot``."""
 
 ABOVE_ZERO = ("mass", "density", "diameter", "radius", "area", "inertia")
 """Where the pattern gives no limits, a number whose name ends in one of these must be above zero."""
@@ -140,6 +159,8 @@ def _completed(part: Source) -> Source:
 def _checked(source: Source, model: Source) -> tuple[dict[str, float], list[Problem]]:
     """Return the values of a file, held against its pattern."""
     wanted, given = dict(leaves(model.table)), dict(leaves(source.table))
+    if model is pattern("vehicle"):
+        wanted |= listed(given)
     problems = [
         source.problem(key, "this file has no such key", nearest_or_all(key, wanted))
         for key in given
@@ -149,6 +170,12 @@ def _checked(source: Source, model: Source) -> tuple[dict[str, float], list[Prob
     for key, leaf in wanted.items():
         if key not in given and key in OPTIONAL:
             values[key] = OPTIONAL[key]
+        elif (
+            key not in given
+            and key.rpartition(".")[2] in OPTIONAL_OF_THRUSTER
+            and key.startswith("thrusters.")
+        ):
+            values[key] = OPTIONAL_OF_THRUSTER[key.rpartition(".")[2]]
         elif key not in given:
             missing.append(
                 source.problem(
@@ -173,6 +200,29 @@ def _incomplete(source: Source, model: Source, missing: list[Problem]) -> Proble
         )
     why = f"{len(missing)} of the {len(dict(leaves(model.table)))} numbers of a {kind} are missing"
     return replace(missing[0], line=None, key="", why=why, remedy=remedy)
+
+
+def listed(given: Mapping[str, Leaf]) -> Leaves:
+    """Return the pattern of the lists that a vehicle may have: its derivatives, and its thrusters.
+
+    Args:
+        given: dotted key → inline table of a file.
+    """
+    names = dict.fromkeys(key.split(".")[1] for key in given if THRUSTER_KEY.match(key))
+    thrusters: Leaves = {
+        f"thrusters.{name}.{key}": {"unit": unit} for name in names for key, unit in THRUSTER.items()
+    }
+    derivatives: Leaves = {key: {"unit": derivative_unit(key)} for key in given if DERIVATIVE.fullmatch(key)}
+    return thrusters | derivatives
+
+
+def derivative_unit(key: str) -> str:
+    """Return the unit of a derivative such as ``derivatives.K_pp``: force per speed, per speed squared, or per rate."""
+    force, _, speed = key.rpartition(".")[2].partition("_")
+    kind = 0 if speed.endswith("dot") else 2 if len(speed) > 1 else 1
+    metres = (force in "KMN") + (speed[0] in "pqr") * (2 if kind == 2 else 1) - (kind == 2)
+    length = {-1: "/m", 0: "", 1: " m", 2: " m2"}[metres]
+    return f"kg{length}/s" if kind == 1 else f"kg{length}"
 
 
 def leaves(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Leaf]]:
@@ -271,6 +321,7 @@ def _numbers_by_key(
     raw = source.table.get(section, {})
     given = dict(_flat(raw)) if isinstance(raw, Mapping) else {}
     allowed = changeable() if given else {}
+    allowed |= {f"vehicle.{key}": leaf for key, leaf in listed(_of_vehicle(given)).items()}
     found: dict[str, float] = {}
     problems = []
     for key, value in given.items():
@@ -283,6 +334,11 @@ def _numbers_by_key(
         else:
             found[key] = float(value)
     return found, problems
+
+
+def _of_vehicle(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the keys of a vehicle among those of vehicle and cable."""
+    return {key.removeprefix("vehicle."): value for key, value in given.items() if key.startswith("vehicle.")}
 
 
 def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

@@ -149,6 +149,19 @@ velocity_down_m_s  | m/s | -20 | 20    | 0 | velocity of the vessel downwards
     many=True,
 )
 
+STATION = _read("""
+bandwidth_rad_s | rad/s | 0.01 | 10 | 0.8 | how fast station keeping answers, its natural frequency
+""") + _read(
+    """
+time_s      | s      | 0      | 86400 | 0 | time since the start
+north_m     | m      | -1e6   | 1e6   | 0 | place to hold, northwards of the start
+east_m      | m      | -1e6   | 1e6   | 0 | the same, eastwards
+depth_m     | m      | 0      | 11000 | 0 | depth to hold, positive down
+heading_deg | degree | -36000 | 36000 | 0 | heading to hold, clockwise from north; it goes on beyond full turns
+""",
+    many=True,
+)
+
 COMMANDS = _read(
     """
 time_s                   | s      | 0    | 86400 |   | time since the start
@@ -208,6 +221,7 @@ SECTIONS = {
     "water": WATER + BED + PROFILE,
     "winch": WINCH,
     "vessel": VESSEL,
+    "station": STATION,
     "commands": COMMANDS,
     "motion": MOTION,
 }

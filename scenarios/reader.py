@@ -7,6 +7,7 @@ water moves the same everywhere.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -29,6 +30,7 @@ from scenarios.trial import (
     TRIM_NEEDS_SPEED,
     Profile,
     Start,
+    Station,
     Trial,
     Vessel,
     Winch,
@@ -96,7 +98,9 @@ def load(
     given = {
         kind: path for kind, path in zip(LISTS, (commands_csv, motion_csv), strict=True) if path is not None
     }
-    samples = reading.keep(read_instructions(reading.source, given, run.get("duration_s")))
+    samples = {}
+    if given or "station" not in reading.source.table:
+        samples = reading.keep(read_instructions(reading.source, given, run.get("duration_s")))
     if "motion" not in samples:
         reading.problems.extend(check_trim(reading.source, start))
     if reading.problems:
@@ -230,7 +234,7 @@ def read_surroundings(source: Source) -> Read:
     """Read [water], [winch] and [vessel] of a trial."""
     fields: dict[str, Any] = {}
     problems: list[Problem] = []
-    for read in (_read_water, _read_winch, _read_vessel):
+    for read in (_read_water, _read_winch, _read_vessel, _read_station):
         found, wrong = read(source)
         fields |= found
         problems += wrong
@@ -346,6 +350,30 @@ def _read_vessel(source: Source) -> Read:
     names = ["velocity_north_m_s", "velocity_east_m_s", "velocity_down_m_s"]
     time = tuple(float(x) for x in samples.time)
     return {"vessel": Vessel(time=time, velocity=_vectors(lists, names, len(time)))}, []
+
+
+def _read_station(source: Source) -> Read:
+    """Return the station that thrusters keep; it stands in place of commands."""
+    if "station" not in source.table:
+        return {}, []
+    values, problems = check_section(source, "station", source.table["station"])
+    if "motion" in source.table or "commands" in source.table:
+        why = "[commands] or [motion] is given too, and thrusters keep this station"
+        return {}, [
+            *problems,
+            source.problem("station", why, "Keep one of [station], [commands] and [motion]."),
+        ]
+    lists = _lists(values, "station")
+    lists.setdefault("time_s", [0.0])
+    samples, wrong = inline(source, "station", lists)
+    problems += wrong + (check_times(samples, None) if samples else [])
+    if problems or samples is None:
+        return {}, problems
+    time = tuple(float(x) for x in samples.time)
+    heading = [math.radians(x) for x in lists.get("heading_deg", [0.0] * len(time))]
+    place = _vectors(lists, ["north_m", "east_m", "depth_m"], len(time))
+    bandwidth = float(values["bandwidth_rad_s"])
+    return {"station": Station(time=time, place=place, heading=tuple(heading), bandwidth=bandwidth)}, []
 
 
 def check_scheme(source: Source, run: Mapping[str, Any], cable: Mapping[str, float]) -> list[Problem]:

@@ -42,6 +42,7 @@ class Page(BaseModel):
     water: dict[str, Any] = {}
     winch: dict[str, Any] = {}
     vessel: dict[str, Any] = {}
+    station: dict[str, Any] = {}
     commands: dict[str, Any] = {}
     motion: dict[str, Any] = {}
     changes: dict[str, Any] = {}

@@ -191,9 +191,8 @@ def complete(source: Source, base: Mapping[str, Leaf], leaves: Mapping[str, Leaf
         table.setdefault(section, {})[name] = made
     for key, leaf in leaves.items():
         section, _, name = key.rpartition(".")
-        table.setdefault(section, {}).setdefault(
-            name, leaf
-        )  # a key that the base does not have is refused later
+        # A key that the base does not have is a thruster's or a derivative, or is refused later.
+        table.setdefault(section, {}).setdefault(name, leaf)
     return replace(source, table=table, text="\n".join(_text(source, table)) + "\n")
 
 
@@ -226,7 +225,7 @@ def _text(source: Source, table: Mapping[str, Mapping[str, Leaf]]) -> Iterator[s
             inside = ", ".join(
                 f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in leaf.items()
             )
-            yield f"{name} = {{ {inside} }}"
+            yield f"{name if name.isidentifier() else json.dumps(name)} = {{ {inside} }}"
 
 
 def _given(source: Source, base: Mapping[str, Leaf], leaves: Mapping[str, Leaf]) -> Given:

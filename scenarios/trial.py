@@ -28,6 +28,7 @@ from scenarios.quantities import (
     RUN,
     SCHEMES,
     START,
+    STATION,
     VESSEL,
     WATER,
     WINCH,
@@ -230,6 +231,36 @@ class Vessel:
         _keep(self, time=_tuples(time), velocity=_tuples(velocity))
 
 
+@dataclass(frozen=True, kw_only=True)
+class Station:
+    """The place, depth and heading that the thrusters hold or follow, linear between the times; then the last hold.
+
+    Attributes:
+        time: starts at 0 and increases. [s]
+        place: north and east of the start, and depth, at each time. [m]
+        heading: at each time, clockwise from north, beyond full turns. [rad]
+        bandwidth: natural frequency of station keeping. [rad/s]
+    """
+
+    time: tuple[float, ...] = (0.0,)
+    place: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)
+    heading: tuple[float, ...] = (0.0,)
+    bandwidth: float = STATION[0].default or 1.0
+
+    def __post_init__(self) -> None:
+        """Raise an error if the fields do not form a station."""
+        check = Checks(self)
+        check.number("bandwidth", STATION[0])
+        time = check.rows("time", STATION[1:2])
+        count = None if time is None else time.size
+        place = check.rows("place", STATION[2:5], count)
+        heading = check.rows("heading", STATION[5:], count)
+        if time is not None:
+            check.increasing("time", time)
+        check.refuse()
+        _keep(self, time=_tuples(time), place=_tuples(place), heading=_tuples(heading))
+
+
 def _tuples(array: np.ndarray | None) -> Any:
     """Return an array as a tuple, of tuples if it has two axes."""
     rows = [] if array is None else array.tolist()
@@ -274,6 +305,7 @@ class Trial:
         sea_bed: depth of a flat sea bed, which a run that goes below it warns of; 0 is not known. [m]
         winch: the winch that turns the drum; None for a free drum.
         vessel: how the drum moves; None for a drum on the shore.
+        station: that the thrusters of the vehicle keep; None for none.
         commands: the commands to the actuators.
         motion: the prescribed motion.
     """
@@ -303,6 +335,7 @@ class Trial:
     sea_bed: float = 0.0
     winch: Winch | None = None
     vessel: Vessel | None = None
+    station: Station | None = None
     commands: Commands | None = None
     motion: Motion | None = None
 
@@ -318,9 +351,12 @@ class Trial:
         check.number("sea_bed", BED[0])
         check.kind("start", (Start,))
         parts = {"commands": Commands, "motion": Motion, "profile": Profile, "winch": Winch, "vessel": Vessel}
+        parts |= {"station": Station}
         there = {name for name, kind in parts.items() if check.kind(name, (kind,), optional=True)}
         if {"commands", "motion"} <= there:
             check.say("motion", "commands are given too", "Keep one of commands and motion.")
+        if {"station", "motion"} <= there:
+            check.say("station", "a prescribed motion keeps no station", "Keep one of station and motion.")
         for name in ("vehicle", "cable", "drum", "tolerances"):
             check.mapping(name)
         check.refuse()

@@ -49,8 +49,8 @@ def contradictions(vehicle: Vehicle) -> list[str]:
     Args:
         vehicle: to look at.
     """
-    if vehicle.hull.length <= 1.01 * vehicle.hull.diameter:
-        return []  # Lamb's spheroid is longer than wide
+    if vehicle.derivatives or vehicle.hull.length <= 1.01 * vehicle.hull.diameter:
+        return []  # a table has no shape, and Lamb's spheroid is longer than wide
     return [*_buoyancy(vehicle), *_outside(vehicle), *_inertias(vehicle)]
 
 

@@ -30,6 +30,7 @@ from vehicle.motor import battery_current, shaft_goal, shaft_rate, shaft_speed, 
 from vehicle.restoring import potential
 from vehicle.state import CHARGE, LINKAGE, SERVO, SHAFT
 from vehicle.terms import BREAKDOWN, POWER_OF_TERM, TERM_COUNT, fill_terms
+from vehicle.thrusters import thruster_rates
 
 if TYPE_CHECKING:
     from vehicle.vehicle import Vehicle, VehicleNumbers
@@ -83,7 +84,7 @@ def evaluate(
     rotation(state[3:7], R)
     relative_velocity(state, R, current_n, nu_r)
     n = shaft_speed(state[SHAFT], state[CHARGE], command[0], nu_r[0], numbers.motor, numbers.propeller)
-    fill_terms(state[7:13], nu_r, R, n, deflections(state, command, numbers), wrench_b, numbers, out)
+    fill_terms(state, nu_r, R, n, deflections(state, command, numbers), wrench_b, numbers, out)
 
 
 @inlined
@@ -98,6 +99,8 @@ def actuators(
         out[SERVO + i] = servo_rate(state[SERVO + i], state[LINKAGE + i], command[1 + i], numbers.servos[i])
         out[LINKAGE + i] = 0.0
     out[CHARGE] = battery_current(state[SHAFT], u, motor, propeller)
+    if numbers.thruster_count > 0:
+        thruster_rates(state, command, numbers.thrusters, numbers.thruster_count, out)
 
 
 @compiled
@@ -119,7 +122,7 @@ def _fill_rates(
     actuators(state, command, nu_r[0], numbers, out)
     motion(state, R, out)
     n = shaft_speed(state[SHAFT], state[CHARGE], command[0], nu_r[0], numbers.motor, numbers.propeller)
-    fill_terms(state[7:13], nu_r, R, n, deflections(state, command, numbers), wrench_b, numbers, terms)
+    fill_terms(state, nu_r, R, n, deflections(state, command, numbers), wrench_b, numbers, terms)
     _accelerations(terms, numbers, out)
 
 
@@ -132,11 +135,11 @@ def derivative(
     numbers: VehicleNumbers,
     out: np.ndarray,
 ) -> None:
-    """Fill out (STATE_SIZE,) with the rate of the state.
+    """Fill out with the rate of the state.
 
     Args:
-        state: as in `vehicle.STATE`.
-        command: propeller [rev/s], rudder, port plane, starboard plane [rad].
+        state: as in `vehicle.STATE`, and the lagged command of each thruster behind it (`Vehicle.state_size`,).
+        command: propeller [rev/s], rudder, port plane, starboard plane [rad], and that of each thruster [-1 … 1].
         current_n: velocity of the water, earth axes. [m/s]
         wrench_b: external force and moment about the hull centre, body axes. [N, N m]
         numbers: `Vehicle.numbers()`.

@@ -18,12 +18,12 @@ from vehicle.dynamics import POWERS, derivative_and_power, finish_step
 from vehicle.state import STATE_SIZE
 from vehicle.vehicle import Vehicle, VehicleNumbers
 
-SIZE = STATE_SIZE + len(POWERS)
+WORKS = len(POWERS)
 
 
 class FreeRun(NamedTuple):
-    """History of a free run: time (n,) [s], states (n, STATE_SIZE), work (n, len(POWERS)) since the start
-    [J].
+    """History of a free run: time (n,) [s], states (n, entries of the state), work (n, len(POWERS)) since
+    the start [J].
     """
 
     time: np.ndarray
@@ -40,9 +40,9 @@ def rates(
     numbers: VehicleNumbers,
     out: np.ndarray,
 ) -> None:
-    """Fill out (SIZE,) with the rates of the state and of the works."""
-    state = y[:STATE_SIZE]
-    derivative_and_power(state, command, current_n, wrench_b, numbers, out[:STATE_SIZE], out[STATE_SIZE:])
+    """Fill out with the rates of y, the state and behind it the works."""
+    n = y.size - WORKS
+    derivative_and_power(y[:n], command, current_n, wrench_b, numbers, out[:n], out[n:])
 
 
 @compiled
@@ -57,16 +57,17 @@ def rk4_step(
     stage: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Fill out (SIZE,) with y one step later [s]; k (4, SIZE) and stage (SIZE,) are scratch."""
+    """Fill out with y one step later [s]; k (4, entries of y) and stage are scratch."""
+    size = y.size
     rates(y, command, current_n, wrench_b, numbers, k[0])
     for i in range(1, 4):
         part = step if i == 3 else 0.5 * step
-        for j in range(SIZE):
+        for j in range(size):
             stage[j] = y[j] + part * k[i - 1, j]
         rates(stage, command, current_n, wrench_b, numbers, k[i])
-    for j in range(SIZE):
+    for j in range(size):
         out[j] = y[j] + step / 6.0 * (k[0, j] + 2.0 * k[1, j] + 2.0 * k[2, j] + k[3, j])
-    finish_step(out[:STATE_SIZE], command, numbers)
+    finish_step(out[: size - WORKS], command, numbers)
 
 
 @allocating
@@ -78,8 +79,8 @@ def march(
     numbers: VehicleNumbers,
     history: np.ndarray,
 ) -> None:
-    """Fill history (n + 1, SIZE) from its first row on, one command of commands (n, 4) a step."""
-    k, stage = np.empty((4, SIZE)), np.empty(SIZE)
+    """Fill history (n + 1, entries of y) from its first row on, one command of commands (n, 4 …) a step."""
+    k, stage = np.empty((4, history.shape[1])), np.empty(history.shape[1])
     for i in range(commands.shape[0]):
         rk4_step(history[i], step, commands[i], current_n, wrench_b, numbers, k, stage, history[i + 1])
 
@@ -100,7 +101,7 @@ def free_run(
         vehicle: the vehicle, or its numbers.
         state: where it starts, for example from `initial_state`.
         commands: one command (4,) for the whole run, or one a step (n, 4): propeller [rev/s], rudder, port
-            plane, starboard plane [rad].
+            plane, starboard plane [rad]; behind them one for each thruster [-1 … 1].
         duration: how long. [s]
         step: of the Runge-Kutta scheme. [s]
         current_n: velocity of the water, earth axes. [m/s]
@@ -108,10 +109,11 @@ def free_run(
     """
     numbers = vehicle.numbers() if isinstance(vehicle, Vehicle) else vehicle
     steps = round(duration / step)
-    held = np.array(np.broadcast_to(np.asarray(commands, dtype=float), (steps, 4)))
-    history = np.zeros((steps + 1, SIZE))
-    history[0, :STATE_SIZE] = state
+    given, size = np.asarray(commands, dtype=float), STATE_SIZE + int(numbers.thruster_count)
+    held = np.array(np.broadcast_to(given, (steps, given.shape[-1])))
+    history = np.zeros((steps + 1, size + WORKS))
+    history[0, : len(state)] = state
     current, wrench = np.array(current_n, dtype=float), np.array(wrench_b, dtype=float)
     march(held, float(step), current, wrench, numbers, history)
     time = step * np.arange(steps + 1)
-    return FreeRun(time, history[:, :STATE_SIZE], history[:, STATE_SIZE:])
+    return FreeRun(time, history[:, :size], history[:, size:])

@@ -24,10 +24,12 @@ from vehicle.axial_drag import axial_drag
 from vehicle.body_lift import body_lift
 from vehicle.cross_flow import cross_flow_drag
 from vehicle.damping import linear_damping, quadratic_damping
+from vehicle.derivatives import add_damping
 from vehicle.fins import rudder, stern_plane
 from vehicle.propeller import propeller
 from vehicle.restoring import restoring
 from vehicle.rigid_body import coriolis
+from vehicle.thrusters import add_thrusters
 
 if TYPE_CHECKING:
     from vehicle.vehicle import VehicleNumbers
@@ -52,10 +54,10 @@ TERMS = (
     Term("body_lift", "viscous lift of the hull and its moment", LOSS),
     Term("cross_flow_drag", "strips of the hull across the flow", LOSS),
     Term("axial_drag", "drag of the hull along its axis", LOSS),
-    Term("linear_damping", "further damping, linear", LOSS),
-    Term("quadratic_damping", "further damping, quadratic by component", LOSS),
+    Term("linear_damping", "further damping, linear, derivatives among it", LOSS),
+    Term("quadratic_damping", "further damping, quadratic, derivatives among it", LOSS),
     Term("restoring", "weight and buoyancy", RESTORING),
-    Term("propeller", "thrust and reaction torque", PROPULSION),
+    Term("propeller", "thrust and reaction torque, of all thrusters too", PROPULSION),
     Term("rudder", "upper and lower rudder", LOSS),
     Term("stern_plane_port", "port stern-plane", LOSS),
     Term("stern_plane_starboard", "starboard stern-plane", LOSS),
@@ -81,7 +83,7 @@ def turning_current(nu: np.ndarray, nu_r: np.ndarray, mass_matrix: np.ndarray, o
 
 @inlined
 def fill_terms(
-    nu: np.ndarray,
+    state: np.ndarray,
     nu_r: np.ndarray,
     R: np.ndarray,
     n: float,
@@ -93,7 +95,7 @@ def fill_terms(
     """Fill out (terms, 6) with every term of TERMS, in that order [N, N m].
 
     Args:
-        nu: velocity over ground, body axes. [m/s, rad/s]
+        state: of the vehicle.
         nu_r: velocity relative to the water, body axes. [m/s, rad/s]
         R: R_nb.
         n: shaft speed. [rev/s]
@@ -102,6 +104,7 @@ def fill_terms(
         numbers: VehicleNumbers.
         out: the terms.
     """
+    nu = state[7:13]
     coriolis(numbers.rigid_body, nu_r, out[0])
     coriolis(numbers.added_mass, nu_r, out[1])
     munk_correction(nu_r, numbers.added_mass, numbers.munk_excess, out[2])
@@ -111,8 +114,12 @@ def fill_terms(
     axial_drag(nu_r, numbers.axial_drag, out[6])
     linear_damping(nu_r, numbers.linear_damping, out[7])
     quadratic_damping(nu_r, numbers.quadratic_damping, out[8])
+    if numbers.tabled:
+        add_damping(nu_r, numbers.linear_table, numbers.quadratic_table, out[7], out[8])
     restoring(R, numbers.restoring, out[9])
     propeller(nu_r, n, numbers.propeller, out[10])
+    if numbers.thruster_count > 0:
+        add_thrusters(state, nu_r, numbers.thrusters, numbers.thruster_count, out[10])
     rudder(nu_r, angles[0], numbers.rudder, out[11])
     stern_plane(nu_r, angles[1], -1.0, numbers.stern_planes, out[12])
     stern_plane(nu_r, angles[2], 1.0, numbers.stern_planes, out[13])

@@ -22,6 +22,7 @@ from vehicle.axial_drag import AxialDrag
 from vehicle.body_lift import BodyLift
 from vehicle.cross_flow import CrossFlowDrag
 from vehicle.damping import LinearDamping, QuadraticDamping
+from vehicle.derivatives import NO_DERIVATIVES, Derivatives, derivatives_of
 from vehicle.fins import FinNumbers, Fins
 from vehicle.geometry import Hull, TowPoint
 from vehicle.motor import Battery, Motor, MotorNumbers, motor_numbers
@@ -29,6 +30,8 @@ from vehicle.parameters import Problem, Section, VehicleError, nearest, paramete
 from vehicle.propeller import Propeller, PropellerNumbers
 from vehicle.restoring import Buoyancy, RestoringNumbers
 from vehicle.rigid_body import RigidBody
+from vehicle.state import STATE_SIZE
+from vehicle.thrusters import MOST_THRUSTERS, Thruster, table_of
 
 
 class VehicleNumbers(Record):
@@ -50,6 +53,11 @@ class VehicleNumbers(Record):
     stern_planes: FinNumbers
     servos: Servos
     motor: MotorNumbers
+    tabled: bool
+    linear_table: np.ndarray
+    quadratic_table: np.ndarray
+    thrusters: np.ndarray
+    thruster_count: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,7 +70,12 @@ class Water(Section):
 
 @dataclass(frozen=True, kw_only=True)
 class Vehicle:
-    """All numbers of a vehicle; each field is a section (a table of its file)."""
+    """All numbers of a vehicle; each field is a section (a table of its file).
+
+    Attributes:
+        derivatives: further damping and added mass, as a table; none for most.
+        thrusters: by name; none for a vehicle of one propeller and fins.
+    """
 
     water: Water
     hull: Hull
@@ -83,6 +96,8 @@ class Vehicle:
     stern_plane_port_servo: Servo
     stern_plane_starboard_servo: Servo
     tow_point: TowPoint
+    derivatives: Derivatives = NO_DERIVATIVES
+    thrusters: tuple[tuple[str, Thruster], ...] = ()
 
     def __post_init__(self) -> None:
         """Raise VehicleError for parts that are not valid, or do not fit."""
@@ -93,9 +108,20 @@ class Vehicle:
             for name, kind in SECTIONS.items()
             if not isinstance(getattr(self, name), kind)
         ]
-        problems = problems or inconsistencies(self.hull, self.added_mass)
+        problems = problems or inconsistencies(self.hull, self.added_mass, self.derivatives)
+        problems += _thruster_problems(self.thrusters)
         if problems:
             raise VehicleError(tuple(problems))
+
+    @property
+    def thruster_list(self) -> tuple[Thruster, ...]:
+        """The thrusters, in the order of their commands."""
+        return tuple(thruster for _, thruster in self.thrusters)
+
+    @property
+    def state_size(self) -> int:
+        """Entries of its state: those of `vehicle.STATE`, and the lagged command of each thruster."""
+        return STATE_SIZE + len(self.thrusters)
 
     def numbers(self) -> VehicleNumbers:
         """Return the numbers of the compiled equations, a copy that may be changed.
@@ -118,6 +144,8 @@ class Vehicle:
     def _numbers(self) -> VehicleNumbers:
         density = self.water.density
         rigid_body, added_mass = self.rigid_body.matrix(), self.added_mass.matrix()
+        if self.derivatives:
+            added_mass = added_mass + self.derivatives.added_mass
         mass_matrix = rigid_body + added_mass
         return VehicleNumbers(
             mass_matrix=mass_matrix,
@@ -140,13 +168,21 @@ class Vehicle:
                 self.stern_plane_starboard_servo.numbers(),
             ),
             motor=motor_numbers(self.motor, self.battery),
+            tabled=bool(self.derivatives),
+            linear_table=self.derivatives.linear,
+            quadratic_table=self.derivatives.quadratic,
+            thrusters=table_of(self.thruster_list),
+            thruster_count=len(self.thrusters),
         )
 
     def with_parameter(self, key: str, value: float) -> Vehicle:
         """Return a new vehicle with one number changed, named "section.parameter"; raises VehicleError."""
-        section, _, name = key.partition(".")
-        mapping = {s: dict(values) for s, values in to_mapping(self).items()}
-        mapping.setdefault(section, {})[name] = value
+        *sections, name = key.split(".")
+        mapping: dict[str, Any] = {s: dict(values) for s, values in to_mapping(self).items()}
+        table = mapping
+        for section in sections:
+            table = table.setdefault(section, {})
+        table[name] = value
         return from_mapping(mapping)
 
 
@@ -198,11 +234,18 @@ SECTIONS: dict[str, type] = {
     "tow_point": TowPoint,
 }
 """Every section of a vehicle and the dataclass that reads it."""
+DERIVATIVES, THRUSTERS = "derivatives", "thrusters"
+"""Sections that a vehicle need not have, and that are lists: derivatives by name, and a table for each thruster."""
 
 
-def to_mapping(vehicle: Vehicle) -> dict[str, dict[str, float]]:
+def to_mapping(vehicle: Vehicle) -> dict[str, dict[str, Any]]:
     """Return the plain numbers of a vehicle, section by section, as `from_mapping` takes them."""
-    return {section: getattr(vehicle, section).by_name() for section in SECTIONS}
+    mapping = {section: getattr(vehicle, section).by_name() for section in SECTIONS}
+    if vehicle.derivatives:
+        mapping[DERIVATIVES] = dict(vehicle.derivatives.table)
+    if vehicle.thrusters:
+        mapping[THRUSTERS] = {name: thruster.by_name() for name, thruster in vehicle.thrusters}
+    return mapping
 
 
 def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
@@ -217,9 +260,9 @@ def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
             key=str(name), found="this table", why="no such section", allowed=nearest(name, list(SECTIONS))
         )
         for name in mapping
-        if name not in SECTIONS
+        if name not in SECTIONS and name not in (DERIVATIVES, THRUSTERS)
     ]
-    sections = {}
+    sections: dict[str, Any] = _lists(mapping, problems)
     for name, kind in SECTIONS.items():
         if name in mapping:
             sections[name] = read_section(kind, name, mapping[name], problems)
@@ -232,9 +275,54 @@ def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
     return Vehicle(**sections)
 
 
-def inconsistencies(hull: Hull, added_mass: AddedMass) -> list[Problem]:
+def _lists(mapping: Mapping[str, object], problems: list[Problem]) -> dict[str, Any]:
+    """Return the derivatives and the thrusters of a mapping; note their problems."""
+    found: dict[str, Any] = {}
+    derivatives, thrusters = (mapping.get(name, {}) for name in (DERIVATIVES, THRUSTERS))
+    for name, table in ((DERIVATIVES, derivatives), (THRUSTERS, thrusters)):
+        if not isinstance(table, Mapping):
+            allowed = "a table of tables, [thrusters.name]" if name == THRUSTERS else "a table of numbers"
+            problems.append(Problem(key=name, found=short(table), why="a table is needed", allowed=allowed))
+            return {}
+    try:
+        found[DERIVATIVES] = derivatives_of(derivatives)  # type: ignore[arg-type]
+    except VehicleError as error:
+        problems.extend(error.problems)
+    rows = [
+        (str(name), read_section(Thruster, f"{THRUSTERS}.{name}", values, problems))
+        for name, values in thrusters.items()  # type: ignore[attr-defined]
+    ]
+    return found | {THRUSTERS: tuple(rows)}
+
+
+def _thruster_problems(thrusters: tuple[tuple[str, Thruster], ...]) -> list[Problem]:
+    """Return the problems of a list of thrusters that are valid by themselves."""
+    problems = [
+        Problem(
+            key=f"{THRUSTERS}.{name}.direction_x",
+            found="a direction of length 0",
+            why="it pushes nowhere",
+            allowed="a vector of the body's axes; its length does not matter",
+        )
+        for name, thruster in thrusters
+        if not thruster.direction.any()
+    ]
+    if len(thrusters) > MOST_THRUSTERS:
+        why = "so many have no room"
+        allowed = f"up to {MOST_THRUSTERS}"
+        problems.append(Problem(key=THRUSTERS, found=f"{len(thrusters)} thrusters", why=why, allowed=allowed))
+    return problems
+
+
+def inconsistencies(
+    hull: Hull, added_mass: AddedMass, derivatives: Derivatives = NO_DERIVATIVES
+) -> list[Problem]:
     """Return the inconsistencies between numbers that are valid by themselves."""
     problems = []
+    if derivatives and np.linalg.eigvalsh(added_mass.matrix() + derivatives.added_mass)[0] < -1e-9:
+        why = "the added mass would give negative kinetic energy"
+        allowed = "a matrix without negative eigenvalues"
+        problems.append(Problem(key=DERIVATIVES, found="its couplings", why=why, allowed=allowed))
     if hull.nose_length + hull.tail_length > hull.length:
         parts = f"nose {hull.nose_length:g} m and tail {hull.tail_length:g} m"
         why = f"together they are longer than the hull, {hull.length:g} m"

@@ -26,7 +26,6 @@ from subzero.engine.external_wrench import tow_point
 from subzero.engine.run_state import IMPULSE, OVERLOAD, PEAK, Fixed, Live, Now, Setup
 from subzero.engine.vehicle_step import advance_hull, follow_track
 from subzero.jit import compiled, inlined, inner, scratch
-from vehicle import STATE_SIZE
 
 MOST_EXCHANGES = 60
 ROUNDING = 1e-14
@@ -230,7 +229,7 @@ def _straight_on(now: Now, ratio: float, i: int) -> float:
 def _move(setup: Setup, live: Live, start: float, span: float) -> bool:
     """Move the hull through an exchange; fill the tow point, relative to the drum; False if the speed is absurd."""
     steps = hull_steps(setup, span)
-    for i in range(STATE_SIZE):
+    for i in range(live.state.size):
         live.path[0, i] = live.state[i]
     if setup.fixed.prescribed:
         follow_track(start, span, steps, setup.track, live.path)
@@ -367,7 +366,7 @@ def _accept(setup: Setup, live: Live, start: float, span: float) -> None:
         force = live.line.ends.tow.force[i] if setup.fixed.tethered else 0.0
         live.now.missed[i] = force - _straight_on(live.now, ratio, i)
         live.now.force_before[i], live.now.force[i] = live.now.force[i], force
-    for i in range(STATE_SIZE):
+    for i in range(live.state.size):
         live.state[i] = live.path[steps, i]
     if live.now.last_step == 0.0:
         for i in range(3):  # the force at the start is a guess: it gives no slope

@@ -48,12 +48,13 @@ from subzero.engine.external_wrench import sample_current, tow_direction, tow_po
 from subzero.engine.prescribed_motion import knots
 from subzero.engine.recording import new_recording, record_row
 from subzero.engine.run_state import LINEAR_ROWS, Fixed, HullWork, Ledger, Live, Now, Orders, Setup
+from subzero.engine.station_keeping import INTEGRALS, station_of
 from subzero.engine.vehicle_step import pose
 from subzero.errors import UserError, printable
 from subzero.external_force import MissingForce
 from subzero.jit import Call, allocating, compile_in_parallel, compiled, made_once
 from subzero.model import Model
-from vehicle import POWERS, STATE_SIZE, Vehicle, initial_state, kinetic_energy, rotation
+from vehicle import POWERS, Vehicle, initial_state, kinetic_energy, rotation
 from vehicle.state import LINKAGE, POSITION, SERVO, VELOCITY
 
 FORCE_TOLERANCE = 1e-9
@@ -92,13 +93,15 @@ def prepare(
     Raises:
         UserError: a start that cannot be.
     """
-    wet, size = _wet_length(trial), STATE_SIZE
+    wet = _wet_length(trial)
+    size = model.vehicle.state_size + (INTEGRALS if trial.station is not None else 0)
     longest = longest_exchange or max(trial.cable_step, float(np.diff(trial.times()).max()))
     steps = most_hull_steps(longest, trial.hull_step)
     setup = setup_of(trial, model, tethered)
+    first = first_state(trial, model, tethered) if state is None else state
     live = Live(
         now=_new_now(),
-        state=first_state(trial, model, tethered) if state is None else state,
+        state=first if first.size == size else np.concatenate([first, np.zeros(size - first.size)]),
         path=np.zeros((steps + 1, size)),
         stages=np.zeros((5, size)),
         powers=np.zeros((steps, len(POWERS))),
@@ -115,8 +118,12 @@ def prepare(
     layout.far_length, layout.far_grading = trial.far_length, trial.far_grading
     layout.run_in = run_in if wet < run_in and _can_run_in(setup.fixed) else 0.0
     lay_out(setup, live, wet)
-    if trial.start.drum is not None:
+    if trial.start.drum is not None and tethered:
         hang_between(setup, live, trial, model)
+    elif trial.start.drum is not None:
+        live.now.ledger.cable_old[:] = live.now.ledger.cable_new[:] = (
+            0.0  # no cable loses anything in the current
+        )
     elif setup.fixed.drum.control != FREE:
         _hang(live.line, float(live.now.guess[2] * setup.fixed.cable.weight))
     return setup, live
@@ -133,7 +140,7 @@ def _needed_last(setup: Setup, live: Live) -> list[Call]:
     kind, now = numba.typeof, numba.typeof(live.now)
     line, work, c, drum = (kind(each) for each in (live.line, live.load, setup.fixed.cable, setup.fixed.drum))
     step, vector, row = numba.float64, numba.float64[::1], numba.int64
-    run = tuple(kind(each) for each in (setup, live, new_recording(1, 1, 1)))
+    run = tuple(kind(each) for each in (setup, live, new_recording(1, 1, 1, live.state.size)))
     return [
         (take_jolt, (line, vector, c, drum, work, vector)),
         (try_step, (line, step, now.typeof("tow"), kind(setup.water), c, drum, work, numba.boolean)),
@@ -179,10 +186,11 @@ def setup_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Setup:
     added, terms = (model.missing or NOTHING).numbers()
     return Setup(
         fixed=_fixed(trial, model, tethered, bool(added.size or terms.size)),
-        orders=_orders(trial),
+        orders=_orders(trial, len(model.vehicle.thrusters)),
         track=_track(trial),
         water=model.water().numbers(),
         led=drum_direction(trial, model, _wet_length(trial)),
+        station=station_of(trial, model.vehicle),
         added=added,
         terms=terms,
     )
@@ -282,11 +290,14 @@ def _as_joint(cable: CableProperties, vehicle: Vehicle, length: float) -> CableN
     return replace(cable, compliance=compliance, internal_damping=damping).numbers()
 
 
-def _orders(trial: scenarios.Trial) -> Orders:
-    """Return the commands, none for a prescribed motion."""
-    if trial.commands is None:
-        return Orders(np.zeros(1), np.zeros((1, 4)))
-    return Orders(np.array(trial.commands.time, dtype=float), np.array(trial.commands.values, dtype=float))
+def _orders(trial: scenarios.Trial, thrusters: int) -> Orders:
+    """Return the commands, none for a prescribed motion; those of thrusters are zero, or written by station keeping."""
+    if trial.commands is None or trial.station is not None:
+        return Orders(np.zeros(1), np.zeros((1, 4 + thrusters)))
+    values = np.array(trial.commands.values, dtype=float)
+    if thrusters:
+        values = np.concatenate([values, np.zeros((values.shape[0], thrusters))], axis=1)
+    return Orders(np.array(trial.commands.time, dtype=float), values)
 
 
 def _track(trial: scenarios.Trial) -> np.ndarray:

@@ -16,6 +16,7 @@ import numpy as np
 from cable.moving_end import NOW, paid_out
 from subzero.engine.external_wrench import row_at, sample_current, tow_wrench
 from subzero.engine.run_state import IMPULSE, OVERLOAD, PEAK, Live, Now, Setup
+from subzero.engine.station_keeping import steer
 from subzero.jit import compiled
 from vehicle import BREAKDOWN, STATE_SIZE, battery_voltage, breakdown, deflections, euler_angles
 
@@ -36,7 +37,7 @@ class Recording(NamedTuple):
     Attributes:
         trace: force of the cable on the hull, body axes [N], number of nodes, and `Now.tug` since the time before, at
             every time of the run, of rows that are not kept, too (times, 7).
-        state: (n, STATE_SIZE), as in `vehicle.STATE`.
+        state: as in `Live` (n, entries of the state).
         attitude: roll, pitch, heading (n, 3). [rad]
         rotation: R_nb (n, 3, 3).
         fins: rudder, port and starboard plane in the water (n, 3). [rad]
@@ -177,11 +178,13 @@ class Pace:
         self.rows = max(1, int(self.rows * min(share, MOST_QUICKER)))
 
 
-def new_recording(rows: int, nodes: int, times: int = 0) -> Recording:
-    """Return an empty recording of `rows` rows, with space for `nodes` nodes in all, and a trace of `times` times."""
+def new_recording(rows: int, nodes: int, times: int = 0, entries: int = STATE_SIZE) -> Recording:
+    """Return an empty recording of `rows` rows of states with so many entries, with space for `nodes` nodes in all, and
+    a trace of `times` times.
+    """
     shapes = {
         "trace": (times, TUG + TUG_SIZE),
-        "state": (rows, STATE_SIZE),
+        "state": (rows, entries),
         "attitude": (rows, 3),
         "rotation": (rows, 3, 3),
         "fins": (rows, 3),
@@ -203,8 +206,10 @@ def record_row(setup: Setup, live: Live, recording: Recording, row: int, time: f
     """Write a row for the present state; return how many nodes are in use after it (`used` before)."""
     state, r = live.state, recording
     command = setup.orders.values[row_at(setup.orders.time, time)]
+    if setup.station.track.shape[0] > 0:
+        steer(setup.station, setup.fixed.vehicle, state, time, command)
     tow_wrench(state, live.now.force, setup.fixed.r_c, live.now.hull)  # fills hull.rotation, too
-    for i in range(STATE_SIZE):
+    for i in range(state.size):
         r.state[row, i] = state[i]
     for i in range(4):
         r.command[row, i] = command[i]

@@ -15,7 +15,9 @@ from vehicle import VehicleNumbers
 
 
 class Orders(NamedTuple):
-    """Commands held between samples: time (n,) [s]; values (n, 4): propeller [rev/s], rudder, planes [rad]."""
+    """Commands held between samples: time (n,) [s]; values (n, 4 and one a thruster): propeller [rev/s], rudder,
+    planes [rad], thrusters [-1 … 1]. Of a vehicle on station, one row, that station keeping writes.
+    """
 
     time: np.ndarray
     values: np.ndarray
@@ -126,6 +128,24 @@ class Now(Record):
     ledger: Ledger
 
 
+class Station(NamedTuple):
+    """A place and a heading that thrusters keep or follow, see `subzero.engine.station_keeping`.
+
+    Attributes:
+        track: time [s], north, east, depth [m] and heading [rad] (n, 5), linear in between; no row: no station.
+        mass: diagonal of the mass matrix with added mass, 0 where an angle is not held (6,). [kg, kg m2]
+        bandwidth: ω. [rad/s]
+        allocate: thrusts per wrench (thrusters, 6).
+        error: of place and heading at the last look (4,), 0 where a thruster is at its limit; work space.
+    """
+
+    track: np.ndarray
+    mass: np.ndarray
+    bandwidth: float
+    allocate: np.ndarray
+    error: np.ndarray
+
+
 class Setup(NamedTuple):
     """The constants of a run.
 
@@ -134,6 +154,7 @@ class Setup(NamedTuple):
         orders, track: the commands to the vehicle, or its motion (LINEAR_ROWS or KNOT_ROWS, n).
         water: how the water moves; its origin is the drum's place at the start.
         led: motion of the drum, and setpoint of its winch, see `cable.drum_motion` (n, 8).
+        station: that thrusters keep; of no rows for none.
         added, terms: the missing force, see `MissingForce.numbers` (7, n), (m, 5); empty for none.
     """
 
@@ -142,6 +163,7 @@ class Setup(NamedTuple):
     track: np.ndarray
     water: Water
     led: np.ndarray
+    station: Station
     added: np.ndarray
     terms: np.ndarray
 
@@ -151,9 +173,9 @@ class Live(NamedTuple):
 
     Attributes:
         now: where it stands.
-        state: of the vehicle, as in `vehicle.STATE`.
-        path: the vehicle's states on the way of an exchange (steps + 1, STATE_SIZE).
-        stages: Runge-Kutta slopes (rows 0 … 3) and the state they are taken at (5, STATE_SIZE).
+        state: of the vehicle, as in `vehicle.STATE`, then a lagged command a thruster and the integrals of a station.
+        path: the vehicle's states on the way of an exchange (steps + 1, entries of the state).
+        stages: Runge-Kutta slopes (rows 0 … 3) and the state they are taken at (5, entries of the state).
         powers: `vehicle.power` at the first stage of each step of an exchange that is booked (steps, 4). [W]
         line: the cable.
         load: work space of the cable.

@@ -14,8 +14,9 @@ import numpy as np
 
 from subzero.engine.external_wrench import add_missing, row_at, sample_current, tow_wrench
 from subzero.engine.run_state import HEADING, LINEAR_ROWS, PITCH, PLACE, SLOPE, SPEED, TIME, Live, Setup
+from subzero.engine.station_keeping import INTEGRALS, steer
 from subzero.jit import allocating, compiled, inlined, inner, scratch
-from vehicle import STATE_SIZE, derivative, derivative_and_power, finish_step, quaternion_from_euler, rotation
+from vehicle import derivative, derivative_and_power, finish_step, quaternion_from_euler, rotation
 
 GAUSS_OFFSET = 0.5 * np.sqrt(0.6)
 """Three-point Gauss quadrature: nodes at the middle and this fraction of a step before and behind it."""
@@ -39,9 +40,11 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
     for n in range(steps):
         state, new = live.path[n], live.path[n + 1]
         command = orders.values[row_at(orders.time, start + n * h)]
+        if setup.station.track.shape[0] > 0:
+            steer(setup.station, setup.fixed.vehicle, state, start + n * h, command)
         for s in range(4):
             part = 0.0 if s == 0 else (h if s == 3 else 0.5 * h)  # stages at t, t + h/2, t + h/2, t + h
-            for i in range(STATE_SIZE):
+            for i in range(new.size):
                 stage[i] = state[i] + (part * k[s - 1, i] if s > 0 else 0.0)
             along = (n * h + part) / span
             # The pull ends at the unknown force, with a slope that is known: only so is the hull's response to
@@ -58,11 +61,14 @@ def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int
                 )
             else:
                 derivative(stage, command, work.current, work.wrench, setup.fixed.vehicle, k[s])
-        for i in range(STATE_SIZE):
+        for i in range(new.size):
             new[i] = state[i] + h / 6.0 * (k[0, i] + 2.0 * k[1, i] + 2.0 * k[2, i] + k[3, i])
         finish_step(
             new, command, setup.fixed.vehicle
         )  # quaternion to length one, linkages behind their servos
+        if setup.station.track.shape[0] > 0:
+            for i in range(INTEGRALS):
+                new[new.size - INTEGRALS + i] += h * setup.station.error[i]
 
 
 @compiled
@@ -137,7 +143,7 @@ def follow_track(start: float, span: float, steps: int, track: np.ndarray, path:
     h = span / steps
     for n in range(steps):
         new, t = path[n + 1], start + n * h
-        for i in range(STATE_SIZE):
+        for i in range(new.size):
             new[i] = path[n, i]
         if track.shape[0] == LINEAR_ROWS:
             _move(track, t + h * (0.5 - GAUSS_OFFSET), h * 5.0 / 18.0, new)

@@ -22,7 +22,7 @@ from subzero.channels import BY_NAME, CHANNELS, TIME
 from subzero.errors import DISTRIBUTION, printable
 from subzero.model import Model
 from subzero.validity import as_json, check_run
-from vehicle import BREAKDOWN
+from vehicle import BREAKDOWN, STATE_SIZE
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -115,12 +115,30 @@ def plain_run(
         for channel in CHANNELS
     }
     result = PlainRun(
-        variables=channels | _arrays(run, spends) | diagnostics,
-        coordinates={TIME.name: Variable("time", run.times, TIME.attributes)} | _axes(run, spends),
+        variables=channels | _arrays(run, spends) | diagnostics | _thrusters(run, model),
+        coordinates={TIME.name: Variable("time", run.times, TIME.attributes)}
+        | _axes(run, spends)
+        | _thruster_names(model),
         attrs=_provenance(trial, model, tethered, run),
     )
     record_accuracy(result, trial, model, accuracy)
     return result
+
+
+def _thrusters(run: Run, model: Model) -> dict[str, Variable]:
+    """Return what the thrusters do, of a vehicle that has some."""
+    count = len(model.vehicle.thrusters)
+    words = "lagged command of each thruster, -1 full astern to 1 full ahead"
+    given = run.recording.state[:, STATE_SIZE : STATE_SIZE + count]
+    attributes = {"units": "1", "long_name": words}
+    return {"thruster_command": Variable(("time", "thruster"), given, attributes)} if count else {}
+
+
+def _thruster_names(model: Model) -> dict[str, Variable]:
+    """Return the axis of the thrusters: their names."""
+    names = [name for name, _ in model.vehicle.thrusters]
+    words = {"long_name": "thruster, by the name of its table in the file of the vehicle"}
+    return {"thruster": Variable("thruster", np.array(names), words)} if names else {}
 
 
 def record_accuracy(

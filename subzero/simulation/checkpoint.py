@@ -164,7 +164,7 @@ def _recording(started: RunState, counts: Mapping[str, int], state: Mapping[str,
     rows, times = started.recording.state.shape[0], started.recording.trace.shape[0]
     if not fits(BYTES_A_NODE * counts["room"]) or counts["behind"] > times or counts["used"] > counts["room"]:
         raise DamagedError("it has more rows than its run")
-    recording = new_recording(rows, counts["room"], times)
+    recording = new_recording(rows, counts["room"], times, started.live.state.size)
     for name, values in recording._asdict().items():
         part = state[f"recording.{name}"]
         here = values[: len(part)]

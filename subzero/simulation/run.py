@@ -305,7 +305,7 @@ def _initial_run_state(trial: scenarios.Trial, model: Model, tethered: bool, gri
     setup.fixed.booked = grid.booked
     rows = row_of(grid.times.size - 1, grid.stride) + 1
     each = min(4 * live.line.length.size, 2 * most_segments(trial, model) + SPARE_NODES)
-    recording = new_recording(rows, rows * each if tethered else 0, grid.times.size)
+    recording = new_recording(rows, rows * each if tethered else 0, grid.times.size, live.state.size)
     return RunState(setup, live, recording, 0, 0, coupling.FINE)
 
 

@@ -126,10 +126,11 @@ class Simulator:
     def reset(self) -> Observation:
         """Return to the start; return the observation there."""
         setup, live = prepare(self.trial, self.model, self._tethered)
-        setup = setup._replace(orders=Orders(np.zeros(1), np.zeros((1, 4))))
-        setup.orders.values[0] = self._command_at(0.0)
+        setup = setup._replace(orders=Orders(np.zeros(1), np.zeros((1, setup.orders.values.shape[1]))))
+        setup.orders.values[0, :4] = self._command_at(0.0)
         times = _times(self.trial)
-        recording = new_recording(times.size, 4 * times.size * live.line.length.size if self._tethered else 0)
+        nodes = 4 * times.size * live.line.length.size if self._tethered else 0
+        recording = new_recording(times.size, nodes, entries=live.state.size)
         used = record_row(setup, live, recording, 0, 0.0, 0)
         at, seen = np.array([0, used, coupling.FINE]), np.zeros(len(Observation._fields))
         seen[6] = pi - 1e-12  # headings begin in [0, 2π), as in `subzero.results.dataset`
@@ -236,7 +237,7 @@ def _with_rows(held: Held, goal: int) -> Held:
     """Return a run with space for rows up to `goal`, and for twice as many as there were."""
     old, times = held.recording, held.times
     rows = max(2 * times.size, goal + 1)
-    new = new_recording(rows, old.tension.size)
+    new = new_recording(rows, old.tension.size, entries=old.state.shape[1])
     for name, values in old._asdict().items():
         getattr(new, name)[: values.shape[0]] = values
     further = whole_steps(times[1], rows)[times.size :]
