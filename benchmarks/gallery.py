@@ -58,6 +58,8 @@ GALLERY = (
     Shown(title="A prescribed dive", commands=("subzero simulate fig5",), folder="fig5", figures=("fig5",)),
     Shown(title="A winch", commands=("subzero simulate winch_trial.toml",), folder="winch_trial",
           figures=("deployment", "cable")),
+    Shown(title="A remotely operated vehicle on station", commands=("subzero compare rov_turn",), folder="rov_turn",
+          figures=("station",)),
     Shown(title="A manoeuvre", commands=("subzero manoeuvre zigzag",), folder="zigzag", figures=("manoeuvre",)),
     Shown(title="An autopilot", commands=("subzero autopilot heading_step --autopilot lqr --feed-forward model",),
           folder="heading_step", figures=("manoeuvre",)),

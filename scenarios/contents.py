@@ -17,7 +17,7 @@ from typing import Any
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source, parsed, read_toml, shipped, shipped_path
 from scenarios.parameters import parameter_names, parameter_values, quantity_of
-from scenarios.parts import PATTERNS, Part, leaves, part_of, read_changes, read_part
+from scenarios.parts import PATTERNS, Part, leaves, part_of, read_changes, read_part, unit_of
 from scenarios.quantities import Quantity
 from scenarios.trial import Trial
 from subzero.errors import printable
@@ -121,7 +121,7 @@ def locate(name_or_path: str | Path) -> tuple[str, Source]:
 def _kind_of(source: Source) -> str:
     """Return the kind of a user's file, by the sections that only this kind has."""
     table = source.table
-    if "base" in table:
+    if {"base", "known", "derivatives", "thrusters", "rigid_body"} & table.keys():
         return "vehicle"
     for kind, key, shape in (("vehicle", "hull", dict), ("cable", "drum", dict), ("trial", "vehicle", str)):
         if isinstance(table.get(key), shape):
@@ -183,7 +183,15 @@ def read_whole(kind: str, source: Source) -> Part:
 def _of_part(kind: str, part: Part) -> Iterator[Number]:
     """Return the numbers of a vehicle or a cable, with the range and the source that its file gives."""
     above = "vehicle." if kind == "vehicle" else ""
-    for key, leaf in leaves(part.source.table if part.source else {}):
+    given = dict(leaves(part.source.table if part.source else {}))
+    left_out: dict[str, Any] = {
+        key: {"value": value, "unit": unit_of(kind, key), "source": "convention: it is left out in the file"}
+        for key, value in part.values.items()
+        if key not in given
+    }
+    whole = given | left_out
+    sections = list(dict.fromkeys(key.rpartition(".")[0] for key in whole))
+    for key, leaf in sorted(whole.items(), key=lambda row: sections.index(row[0].rpartition(".")[0])):
         low, high = leaf.get("range", (float("nan"), float("nan")))
         yield Number(
             name=f"{above}{key}",

@@ -1,4 +1,4 @@
-"""The file of a vehicle of few numbers, written: what is known, with what else could be, each explained.
+"""The file of a vehicle of few numbers, written: the known ones, and others that could be given, explained.
 
 What follows from it is `scenarios.similar_vehicle`.
 """

@@ -30,6 +30,8 @@ from scenarios.parts import (
     Part,
     changeable,
     leaves,
+    listed,
+    nested,
     read_changes,
     read_part,
     read_tolerances,
@@ -210,10 +212,10 @@ def with_vehicle(trial: Trial, named: str | Path) -> tuple[Trial, Source]:
     """
     here = replace(_source_of(trial), folder=Path())
     part, file = _part(here, "vehicle", str(named))
-    values = {f"vehicle.{key}": value for key, value in part.values.items()}
     changes, _ = read_changes(here)
     changed = with_parameters(
-        trial, values | {key: change for key, change in changes.items() if key in values}
+        replace(trial, vehicle=nested(part.values)),
+        {key: value for key, value in changes.items() if key.removeprefix("vehicle.") in part.values},
     )
     tolerances = {
         key: tolerance for key, tolerance in trial.tolerances.items() if not key.startswith("vehicle.")
@@ -249,14 +251,23 @@ Row = Quantity | Leaf
 
 
 @cache
-def _part_rows() -> dict[str, Leaf]:
+def _pattern_rows() -> dict[str, Leaf]:
     return changeable()
+
+
+def _part_rows(trial: Trial) -> dict[str, Leaf]:
+    """Return the numbers of the parts of a trial: of every vehicle and cable, its derivatives and thrusters."""
+    lists = {name: trial.vehicle[name] for name in ("derivatives", "thrusters") if name in trial.vehicle}
+    if not lists:
+        return _pattern_rows()
+    own = listed(dict(leaves(lists)))
+    return _pattern_rows() | {f"vehicle.{key}": leaf for key, leaf in own.items()}
 
 
 def _known(trial: Trial) -> dict[str, tuple[Row, np.ndarray]]:
     """Return dotted name → its quantity, and its value or values (n,), in the unit of the files."""
     known: dict[str, tuple[Row, np.ndarray]] = {}
-    for name, row in _part_rows().items():
+    for name, row in _part_rows(trial).items():
         known[name] = row, np.array([_part_value(trial, name)])
     for section, owner, rows in (("run", trial, RUN), ("start", trial.start, START)):
         for field, quantity in by_field(rows).items():
@@ -275,7 +286,7 @@ def _row(trial: Trial, name: str) -> tuple[Row, int] | None:
     """
     section, _, key = name.partition(".")
     if section in PARTS:
-        row = _part_rows().get(name)
+        row = _pattern_rows().get(name) or _part_rows(trial).get(name)
         return None if row is None else (row, 1)
     if section in ("run", "start", "water") and (single := _SINGLE[section].get(key)):
         return single, 1

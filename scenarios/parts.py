@@ -38,7 +38,7 @@ LEAF_KEYS = ("value", "unit", "range", "tolerance", "limits", "source")
 
 SERVOS = ("rudder_servo", "stern_plane_port_servo", "stern_plane_starboard_servo")
 FEW = 5
-"""So many missing numbers are named one by one; more are one problem, as the file has hardly begun."""
+"""So many missing numbers are named one by one; more are one problem, of a file that is not a whole one yet."""
 
 OPTIONAL = {
     "cable.internal_damping": 0.0,
@@ -190,7 +190,7 @@ def _checked(source: Source, model: Source) -> tuple[dict[str, float], list[Prob
 
 
 def _incomplete(source: Source, model: Source, missing: list[Problem]) -> Problem:
-    """Return one problem for a file that has hardly begun: how many numbers are missing, and how to begin."""
+    """Return one problem for a file that is not a whole one yet: how many numbers are missing, and how to begin."""
     kind = "vehicle" if model is pattern("vehicle") else "cable"
     bases = " or ".join(f'"{name}"' for name in ("torpedo", *sorted(set(shipped("vehicles")) - {"torpedo"})))
     remedy = f"Begin with a whole one: subzero new my_{kind}.toml --like {model.name}."
@@ -214,6 +214,11 @@ def listed(given: Mapping[str, Leaf]) -> Leaves:
     }
     derivatives: Leaves = {key: {"unit": derivative_unit(key)} for key in given if DERIVATIVE.fullmatch(key)}
     return thrusters | derivatives
+
+
+def unit_of(kind: str, key: str) -> str:
+    """Return the unit of a number that a file of a kind may leave out."""
+    return str((dict(leaves(pattern(kind).table)) | listed({key: {}}))[key]["unit"])
 
 
 def derivative_unit(key: str) -> str:

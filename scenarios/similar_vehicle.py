@@ -198,7 +198,7 @@ def complete(source: Source, base: Mapping[str, Leaf], leaves: Mapping[str, Leaf
 
 def _scaled(leaf: Leaf, factor: float | None, added: float, named: str) -> dict[str, Any]:
     """Return a number of the base, scaled and moved; as it is, and a guess, where it has no factor."""
-    if factor is None:
+    if factor is None or (leaf["value"] == 0.0 and "range" not in leaf):
         was = str(leaf.get("source", ""))
         guess = was if was.startswith("estimate") else f"estimate: as {named} ({was})"
         return {name: value for name, value in leaf.items() if name != "tolerance"} | {"source": guess}
@@ -262,7 +262,7 @@ def _given(source: Source, base: Mapping[str, Leaf], leaves: Mapping[str, Leaf])
 
 
 def _factors(source: Source, given: Given) -> tuple[dict[str, float], dict[str, float]]:
-    """Return how many times the base's value each derived number is, and what is added to some."""
+    """Return how many times the base's value each derived number is, and an addend to some."""
     long, wide = given.times("hull.length"), given.times("hull.diameter")
     if given.said("hull.length") is None:
         long = wide  # of one size only: the whole hull is larger

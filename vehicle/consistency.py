@@ -51,7 +51,7 @@ def contradictions(vehicle: Vehicle) -> list[str]:
     """
     if vehicle.derivatives or vehicle.hull.length <= 1.01 * vehicle.hull.diameter:
         return []  # a table has no shape, and Lamb's spheroid is longer than wide
-    return [*_buoyancy(vehicle), *_outside(vehicle), *_inertias(vehicle)]
+    return [*_buoyancy(vehicle), *_misplaced(vehicle), *_inertias(vehicle)]
 
 
 def _buoyancy(vehicle: Vehicle) -> list[str]:
@@ -67,7 +67,7 @@ def _buoyancy(vehicle: Vehicle) -> list[str]:
     ]
 
 
-def _outside(vehicle: Vehicle) -> list[str]:
+def _misplaced(vehicle: Vehicle) -> list[str]:
     """Compare the stations of fins and tow point with nose and tail."""
     hull, said = vehicle.hull, []
     nose, tail = hull.nose_station, hull.nose_station - hull.length

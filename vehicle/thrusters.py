@@ -26,7 +26,7 @@ from vehicle.parameters import Section, parameter
 from vehicle.state import QUICKEST, STATE_SIZE
 
 MOST_THRUSTERS = 12
-"""So many thrusters have room in the compiled numbers: one layout, so that all vehicles share one machine code."""
+"""The compiled numbers hold so many thrusters: one layout, so that all vehicles share one machine code."""
 
 (PX, PY, PZ, DX, DY, DZ, AHEAD, ASTERN, EXPONENT, DEAD_BAND, INFLOW, REACTION, LAG, LOST) = range(14)
 COLUMNS = 14
@@ -40,9 +40,9 @@ class Thruster(Section):
     x: float = parameter("place, forward of the hull centre", "m")
     y: float = parameter("place, to starboard", "m")
     z: float = parameter("place, downward", "m")
-    direction_x: float = parameter("direction of thrust ahead, forward", "1", low=-1.0, high=1.0)
-    direction_y: float = parameter("direction of thrust ahead, to starboard", "1", low=-1.0, high=1.0)
-    direction_z: float = parameter("direction of thrust ahead, downward", "1", low=-1.0, high=1.0)
+    direction_x: float = parameter("direction of thrust ahead, forward", "1")
+    direction_y: float = parameter("direction of thrust ahead, to starboard", "1")
+    direction_z: float = parameter("direction of thrust ahead, downward", "1")
     thrust_ahead: float = parameter("thrust at full command ahead, at rest, T_ahead", "N", above=0.0)
     thrust_astern: float = parameter("thrust at full command astern, at rest, T_astern", "N", above=0.0)
     curve_exponent: float = parameter("exponent of the thrust curve, e; 2: n squared", "1", low=0.5, high=4.0)

@@ -37,7 +37,7 @@ RUN_IN = 12.0
 USUAL_SPEED = 1.0
 """Of the bare hull in the straight run. [m/s]"""
 SPARE = 1.25
-"""A hull that needs a faster flow gets so much more than the least that holds it level: room for its fins. [-]"""
+"""A hull that needs a faster flow gets so much more than the least that holds it level, for its fins. [-]"""
 
 Command = tuple[float, float, float, float]
 
@@ -272,6 +272,7 @@ def manoeuvre(
     line = chosen(MANOEUVRES, name, "manoeuvre")
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
     model = model_of(trial, model)
+    _check_actuators(line, name, model)
     speed = usual_speed(model) if speed is None else speed
     inner = _checked_size(line, min(line.size, _largest(line, model)) if size is None else size, model)
     straight = tuple(trim(model, speed=speed).command.tolist())
@@ -280,6 +281,18 @@ def manoeuvre(
     run = fly(begin, program, lambda t: _NOTHING, tethered=tethered, model=model, progress=progress)
     run = run.drop_vars(["wanted_speed", "wanted_heading", "wanted_depth"])
     return run, line.measure(_inner(run), inner)
+
+
+def _check_actuators(line: Manoeuvre, name: str, model: Model) -> None:
+    """Raise an error for a vehicle that lacks what a manoeuvre moves."""
+    hull = model.vehicle
+    lacking = [] if hull.propeller.thrust_constant > 0.0 else ["propeller"]
+    fins = {"rudder": hull.rudder, "stern-planes": hull.stern_planes}
+    moved = {ZigZag: "rudder", TurningCircle: "rudder", Spiral: "rudder", VerticalZigZag: "stern-planes"}
+    lacking += [fin for fin, section in fins.items() if moved.get(line.program) == fin and not section.area]
+    if lacking:
+        other = " Its thrusters keep a station: see rov_turn." if hull.thrusters else ""
+        raise UserError(f"{name} needs a {' and a '.join(lacking)}, and this vehicle has none.{other}")
 
 
 def usual_speed(model: Model) -> float:

@@ -1,10 +1,10 @@
 """Figures of runs and comparisons, fit to print: units on every axis, one style, the trial named on each.
 
-`draw` gives the figures that belong to some runs. A run that follows commands gets the four panels of
-Fig. 6 of Feng and Allen (2004), actuators and attitude, the cable's shape, the tension along it over time,
-forces and energy. A prescribed run gets Fig. 4 if it is straight, with its exact solution, and Fig. 5 if it
-is not, besides the cable. A winch, or a vessel that carries the drum, adds a figure of what it does. Inside
-`page_width` they are as narrow as a column of a page.
+`draw` gives the figures that belong to some runs. A run that follows commands gets the four panels of Fig. 6 of Feng
+and Allen (2004), actuators and attitude (one on station its place and its thrusters instead), the cable's shape, the
+tension along it over time, forces and energy. A prescribed run gets Fig. 4 if it is straight, with its exact solution,
+and Fig. 5 if it is not, besides the cable. A winch, or a vessel that carries the drum, adds a figure of what it does.
+Inside `page_width` they are as narrow as a column of a page.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from subzero.arguments import check_is_run, checked_arguments
 from subzero.errors import BadValueError
 from subzero.figures.cable import deployment, is_deployed, shape, tension
 from subzero.figures.forces import forces
-from subzero.figures.motion import attitude, figure_6, measured
+from subzero.figures.motion import attitude, figure_6, measured, station
 from subzero.figures.prescribed import exact_tension, figure_4, figure_5, is_straight
 from subzero.figures.style import Runs, Title, page_width, warnings_in_short
 
@@ -37,6 +37,7 @@ __all__ = [
     "measured",
     "page_width",
     "shape",
+    "station",
     "tension",
 ]
 
@@ -71,7 +72,10 @@ def draw(runs: Runs | xr.Dataset, record: Record | None = None) -> dict[str, Fig
 
 def _commanded(runs: Runs, record: Record | None, title: Title) -> dict[str, Figure]:
     """Return the figures of a vehicle that follows commands."""
-    figures = {"fig6": figure_6(runs, record, title), "attitude": attitude(runs, record, title)}
+    if "thruster_command" in next(iter(runs.values())):
+        figures = {"station": station(runs, record, title)}
+    else:
+        figures = {"fig6": figure_6(runs, record, title), "attitude": attitude(runs, record, title)}
     if "tethered" in runs:
         figures |= _cable(runs["tethered"], title)
     figures["forces"] = forces(runs.get("tethered", next(iter(runs.values()))), title)

@@ -271,7 +271,9 @@ def _tracks(run: xr.Dataset, axes: Axes) -> None:
     """Draw the ways of vehicle and drum from above, with a dot every minute."""
     time = run["time"].values
     spacing = MARKS if time[-1] >= 2.0 * MARKS else max(0.1 * time[-1], 1e-9)
-    marks = np.searchsorted(time, np.arange(0.0, time[-1] + 1e-9, spacing))
+    marks = np.searchsorted(
+        time, np.arange(0.0, time[-1] + 1e-9, spacing) - 1e-9
+    )  # the last may round beyond
     ways = {"vehicle": run["cable_position"].values[:, 0], "drum": drum_direction(run)}
     for (words, way), colour in zip(ways.items(), (style.ORANGE, style.BLUE), strict=True):
         axes.plot(way[:, EAST], way[:, NORTH], color=colour, linewidth=1.2, label=words)

@@ -78,6 +78,34 @@ def attitude(runs: Runs, record: Record | None, title: Title) -> Figure:
     return figure
 
 
+STATION = {
+    "north": "Place, northwards of the start",
+    "east": "Place, eastwards of the start",
+    "depth": "Depth",
+    "heading": "Heading, clockwise from north",
+    "pitch": "Pitch, positive nose up",
+}
+
+
+def station(runs: Runs, record: Record | None, title: Title) -> Figure:
+    """Draw a vehicle of thrusters: its place, heading and pitch, and the commands of its thrusters, of one run."""
+    figure, panels = sheet(3, 2, title)
+    for axes, (name, words) in zip(panels[:5], STATION.items(), strict=True):
+        channel_panel(axes, runs, name, record)
+        headline(axes, words)
+    panels[2].invert_yaxis()
+    which, run = next(iter(runs.items()))
+    for name, command in zip(run["thruster"].values, run["thruster_command"].values.T, strict=True):
+        panels[5].plot(run["time"].values, command, linewidth=0.8, label=str(name).replace("_", " "))
+    label(panels[5], None, "share of full command [-]")
+    headline(panels[5], f"Thrusters, {which}")
+    in_time(panels[5], runs)
+    legend(panels[5], columns=2)
+    legend(panels[0])
+    time_label(panels, 2)
+    return figure
+
+
 def measured(runs: Runs, record: Record, title: Title) -> Figure | None:
     """Draw all measured channels that figure 6 and the attitude do not show; None if there are none."""
     names = [name for name in record.values if name not in SHOWN]

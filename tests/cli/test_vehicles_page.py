@@ -1,0 +1,66 @@
+"""The page of vehicles, run as a stranger would in an empty folder: its commands, and its files put together."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+import subzero
+from scenarios.contents import contents
+from subzero.cli.app import main
+
+PAGE = (Path(__file__).parents[2] / "docs" / "vehicles.md").read_text(encoding="utf-8")
+TOML = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
+
+
+def test_the_commands_of_a_torpedo_from_four_numbers(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for line in re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL)[0:2]:
+        for command in line.strip().splitlines():
+            assert main(tuple(command.split()[1:])) == 0, command
+    said = capsys.readouterr().out
+    assert "3 measured, 58 derived, 57 guessed" in said
+    assert "It goes 1.8 m/s at 21.8 rev/s." in said
+    assert (tmp_path / "zigzag" / "tethered.csv").exists()
+
+
+def test_a_torpedo_that_cannot_be_leaves_nothing_behind(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(("new", "auv.toml", "--torpedo", "lenght=2.0")) == 2
+    assert main(("new", "auv.toml", "--torpedo", "length=2.0", "speed=1.8", "propeller_rps=1")) == 2
+    assert "Did you mean 'length'?" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_files_of_the_page_are_files(tmp_path):
+    few, derivatives, thruster, station = TOML
+    (tmp_path / "few.toml").write_text(few)
+    (tmp_path / "rov.toml").write_text(derivatives + thruster)
+    assert len(contents(str(tmp_path / "few.toml")).numbers) == 118
+    names = {number.name for number in contents(str(tmp_path / "rov.toml")).numbers}
+    assert {"vehicle.derivatives.N_v", "vehicle.thrusters.front_port.lag"} <= names
+    text = subzero.load_scenario("rov_turn").text
+    (tmp_path / "trial.toml").write_text(text[: text.index("\n[station]")] + "\n" + station)
+    trial = subzero.load_scenario(tmp_path / "trial.toml")
+    assert trial.station is not None
+    assert trial.station.heading[-1] == pytest.approx(3.14159, abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    "change, said",
+    [
+        (("base = ", "bose = "), "numbers of a vehicle are missing"),
+        (("X_u = ", "X_q7 = "), "no such key"),
+        (('unit = "kg/s"', 'unit = "kg"'), 'unit = "kg/s"'),
+        (("thrust_ahead = ", "thrust_forward = "), "Did you mean 'thrusters.front_port."),
+        (("thrust_ahead = { value = 30.4", "thrust_ahead = { value = -1.0"), "thrust at full command ahead"),
+    ],
+)
+def test_a_slip_in_a_table_is_said_with_its_line(tmp_path, capsys, change, said):
+    (tmp_path / "rov.toml").write_text((TOML[1] + TOML[2]).replace(*change))
+    assert main(("validate", str(tmp_path / "rov.toml"))) == 2
+    message = capsys.readouterr().err
+    assert said in message
+    assert message.count("\n") <= 11
