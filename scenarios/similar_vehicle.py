@@ -339,6 +339,8 @@ def _drive(source: Source, given: Given, factors: dict[str, float]) -> dict[str,
 
     def number(key: str) -> float:
         said = given.said(key)
+        if key.startswith("derivatives."):
+            return said or 0.0
         return factors.get(key, 1.0) * given.before(key) if said is None else said
 
     drag, found = _drag(number, given.speed), {}
@@ -391,7 +393,9 @@ def _drag(number: Any, speed: float) -> float:
         number(f"{fin}.area") * number(f"{fin}.profile_drag_coefficient")
         for fin in ("rudder", "stern_planes")
     )
-    return float((hull + rho * fins) * speed**2 - number("linear_damping.surge") * speed)
+    linear, square = (number(f"derivatives.X_{name}") for name in ("u", "uu"))
+    hull += rho * fins - square
+    return float(hull * speed**2 - (linear + number("linear_damping.surge")) * speed)
 
 
 def _thrust(number: Any, diameter: float, rps: float, speed: float) -> float:

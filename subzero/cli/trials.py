@@ -105,7 +105,7 @@ def _new_torpedo(path: Path, words: list[str], output_mode: OutputMode) -> int:
     doubts = _doubts(found)
     numbers = {number.name.removeprefix("vehicle."): number.values[0] for number in found.numbers}
     speed = known.get("speed_m_s")
-    command = speed_command(numbers.__getitem__, speed) if speed else None
+    command = speed_command(lambda key: numbers.get(key, 0.0), speed) if speed else None
     sentence = f"It goes {speed:g} m/s at {command:.1f} rev/s." if command else ""
     title = f"{path.stem}: a torpedo of {len(known)} known numbers."
     make_toml(path, file_text("torpedo", known, title, sentence))

@@ -118,6 +118,11 @@ def _logged(
             "beside it."
         )
     trial = load(named)
+    if trial.station is not None:
+        raise UserError(
+            f"'{trial.name}' keeps a station with thrusters, which no cause of the catalogue knows: it can be "
+            "simulated and compared, not diagnosed or calibrated."
+        )
     _refuse(record.source, time_problems(record, trial, longer=commands == FROM_RECORD))
     trial = cut_to(trial_with_commands(trial, record, commands), record)
     values, notes = _channels(record, sidecar)

@@ -128,20 +128,22 @@ class Now(Record):
     ledger: Ledger
 
 
+BANDWIDTH = 6
+"""Place of ω in the gains of a station."""
+
+
 class Station(NamedTuple):
     """A place and a heading that thrusters keep or follow, see `subzero.engine.station_keeping`.
 
     Attributes:
         track: time [s], north, east, depth [m] and heading [rad] (n, 5), linear in between; no row: no station.
-        mass: diagonal of the mass matrix with added mass, 0 where an angle is not held (6,). [kg, kg m2]
-        bandwidth: ω. [rad/s]
+        gains: diagonal of the mass matrix with added mass, 0 where an angle is free [kg, kg m2], then ω [rad/s] (7,).
         allocate: thrusts per wrench (thrusters, 6).
         error: of place and heading at the last look (4,), 0 where a thruster is at its limit; work space.
     """
 
     track: np.ndarray
-    mass: np.ndarray
-    bandwidth: float
+    gains: np.ndarray
     allocate: np.ndarray
     error: np.ndarray
 

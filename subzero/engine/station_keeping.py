@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 import scenarios
-from subzero.engine.run_state import Station
+from subzero.engine.run_state import BANDWIDTH, Station
 from subzero.errors import UserError
 from subzero.jit import compiled, scratch
 from vehicle import Vehicle, VehicleNumbers, euler_angles, rotation
@@ -38,7 +38,7 @@ def station_of(trial: scenarios.Trial, vehicle: Vehicle) -> Station:
     """
     station = trial.station
     if station is None:
-        return Station(np.zeros((0, 5)), np.zeros(6), 0.0, np.zeros((0, 6)), np.zeros(INTEGRALS))
+        return Station(np.zeros((0, 5)), np.zeros(7), np.zeros((0, 6)), np.zeros(INTEGRALS))
     lacking = unheld_axes(vehicle.thruster_list, HELD)
     if lacking:
         have = (
@@ -53,7 +53,7 @@ def station_of(trial: scenarios.Trial, vehicle: Vehicle) -> Station:
         mass[AXES.index(axis)] = 0.0
     track = np.column_stack([station.time, np.array(station.place), station.heading]).astype(float)
     return Station(
-        track, mass, float(station.bandwidth), allocation(vehicle.thruster_list), np.zeros(INTEGRALS)
+        track, np.append(mass, station.bandwidth), allocation(vehicle.thruster_list), np.zeros(INTEGRALS)
     )
 
 
@@ -89,7 +89,7 @@ def steer(
     earth, body = scratch(3, 3), scratch(3, 3)
     rotation(state[3:7], R)
     _wanted(station.track, time, place, rate)
-    w, last = station.bandwidth, state.size - INTEGRALS
+    w, last = station.gains[BANDWIDTH], state.size - INTEGRALS
     roll, pitch, heading = euler_angles(state[3:7])
     turn = place[3] - heading
     turn -= 2.0 * np.pi * np.round(turn / (2.0 * np.pi))
@@ -100,12 +100,12 @@ def steer(
             body[k, i] = R[0, i] * earth[k, 0] + R[1, i] * earth[k, 1] + R[2, i] * earth[k, 2]
     for i in range(3):
         damped = 2.0 * DAMPING_RATIO * w * (body[1, i] - state[7 + i])
-        wrench[i] = station.mass[i] * (w * w * (body[0, i] + INTEGRAL_SHARE * w * body[2, i]) + damped)
+        wrench[i] = station.gains[i] * (w * w * (body[0, i] + INTEGRAL_SHARE * w * body[2, i]) + damped)
     w *= ATTITUDE_RATIO
-    wrench[3] = -station.mass[3] * w * (w * roll + 2.0 * DAMPING_RATIO * state[10])
-    wrench[4] = -station.mass[4] * w * (w * pitch + 2.0 * DAMPING_RATIO * state[11])
+    wrench[3] = -station.gains[3] * w * (w * roll + 2.0 * DAMPING_RATIO * state[10])
+    wrench[4] = -station.gains[4] * w * (w * pitch + 2.0 * DAMPING_RATIO * state[11])
     damped = 2.0 * DAMPING_RATIO * w * (rate[3] - state[12])
-    wrench[5] = station.mass[5] * (w * w * (turn + INTEGRAL_SHARE * w * state[last + 3]) + damped)
+    wrench[5] = station.gains[5] * (w * w * (turn + INTEGRAL_SHARE * w * state[last + 3]) + damped)
     made = commands_of_wrench(wrench, station.allocate, numbers.thrusters, numbers.thruster_count, command)
     for i in range(3):
         station.error[i] = earth[0, i] if made == 1.0 else 0.0  # wound up no further than the thrusters reach

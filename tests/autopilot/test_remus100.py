@@ -79,7 +79,7 @@ def fig6(tmp_path_factory):
 def test_a_speed_too_slow_for_its_buoyancy_is_refused_with_the_slowest_that_it_holds(fig6):
     """7 N of net buoyancy: at 1 m/s hull and planes have too little lift."""
     with pytest.raises(autopilot.NoTrimError) as caught:
-        autopilot.manoeuvre("zigzag", fig6)
+        autopilot.manoeuvre("zigzag", fig6, speed=1.0)
     slowest = float(re.search(r"the hull holds ([0-9.]+) m/s at least", str(caught.value)).group(1))
     autopilot.trim(subzero.Model.of(fig6), speed=slowest)
     with pytest.raises(autopilot.NoTrimError):

@@ -89,10 +89,10 @@ def test_a_run_that_outgrows_the_memory_keeps_what_it_has(fig6, monkeypatch):
     np.testing.assert_array_equal(run["surge_speed"], whole["surge_speed"][:rows])
 
 
-def with_little_room(rows, nodes, times):
+def with_little_room(rows, nodes, times, entries):
     from subzero.engine.recording import new_recording
 
-    return new_recording(rows, min(nodes, 2000), times)
+    return new_recording(rows, min(nodes, 2000), times, entries)
 
 
 @pytest.fixture

@@ -31,6 +31,11 @@ def numbers_of(path) -> dict[str, float]:
     return {number.name.removeprefix("vehicle."): number.values[0] for number in contents(str(path)).numbers}
 
 
+def command_numbers(path):
+    """What `speed_command` takes: 0 for a derivative that the file does not have."""
+    return lambda key: numbers_of(path).get(key, 0.0)
+
+
 def made(tmp_path, known: str, more: str = "", base: str = "torpedo") -> Vehicle:
     file = tmp_path / "auv.toml"
     file.write_text(f'base = "{base}"\n[known]\n{known}\n{more}')
@@ -95,7 +100,7 @@ def test_a_speed_is_reached_straight_ahead_at_the_command_that_is_given_for_it(t
     """4 %: fins at an angle against the reaction torque of the propeller brake a little more."""
     known = "length_m = 2.0\ndiameter_m = 0.2\nmass_kg = 45\nspeed_m_s = 1.8"
     hull = made(tmp_path, known)
-    rps = speed_command(numbers_of(tmp_path / "auv.toml").__getitem__, 1.8)
+    rps = speed_command(command_numbers(tmp_path / "auv.toml"), 1.8)
     run = free_run(hull, initial_state(velocity=(1.0, 0, 0, 0, 0, 0)), (rps, 0.0, 0.0, 0.0), 60.0)
     assert run.states[-1, 7] == pytest.approx(1.8, rel=0.04)
 
@@ -105,7 +110,7 @@ def test_a_speed_and_its_command_are_met_by_the_propeller_or_by_the_drag_if_that
     tmp_path, propeller
 ):
     hull = made(tmp_path, f"length_m = 2.0\ndiameter_m = 0.2\nspeed_m_s = 1.5\npropeller_rps = 15{propeller}")
-    found = speed_command(numbers_of(tmp_path / "auv.toml").__getitem__, 1.5)
+    found = speed_command(command_numbers(tmp_path / "auv.toml"), 1.5)
     assert found == pytest.approx(15.0, rel=1e-4)
     assert (hull.propeller.diameter == 0.15) == bool(propeller)
     assert (hull.axial_drag.drag_coefficient == 0.28) != bool(propeller)
