@@ -95,7 +95,9 @@ def _of_channel(problem: Problem, linear: Linear, name: str, own: list[Term]) ->
 
 def _delays(problem: Problem, linear: Linear, name: str, own: list[Term]) -> Iterator[Term]:
     """Yield a delay of a channel that begins at the delay which leaves least of it."""
-    (term,) = [term for term in own if term.kind == "delay"]
+    term = next((term for term in own if term.kind == "delay"), None)
+    if term is None:
+        return
     terms = with_term(linear.terms, term)
     entries = problem.entries(terms)
     (place,) = [i for i, entry in enumerate(entries) if entry.kind == "delay" and entry.name == name]

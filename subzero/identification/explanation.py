@@ -74,7 +74,7 @@ class Entry:
     """A free number of an explanation.
 
     Attributes:
-        kind: number, start, cause, since, unknown, offset, gain, drift, delay.
+        kind: number, start, cause, change, since, unknown; of a sensor offset, step, gain, drift, delay.
         name: of the parameter, cause and number ("overflow.lip"), unknown input, or channel.
         record: which it belongs to; −1 if all share it.
         centre, sd: mean and standard deviation of its prior. [its unit]
@@ -214,7 +214,9 @@ def data_terms(model: Model) -> list[Term]:
             ("scale", "has an error of scale"),
             ("affine", "has another scale and zero"),
         ]
-        soft += [("drift", "drifts"), ("delay", "is late or early against the inputs")]
+        soft.append(("drift", "drifts"))
+        if not sensor.logger:  # channels of one logger have one clock
+            soft.append(("delay", "is late or early against the inputs"))
         found += [
             Term(f"{kind}:{name}", f"{name} {words}", kind, name, odds / len(soft)) for kind, words in soft
         ]
@@ -275,8 +277,8 @@ def entries_of(
     for term in terms:
         if term.kind == "cause":
             found += _of_cause(causes[term.target], term)
-        elif term.is_data_error:
-            found += _of_data_error(term, levels[term.target], intervals[term.target])
+    for name in levels:
+        found += _of_sensor(name, model, terms, levels[name], intervals[name])
     return found
 
 
@@ -309,13 +311,37 @@ def _of_cause(cause: Cause, term: Term) -> list[Entry]:
     return found
 
 
-def _of_data_error(term: Term, level: float, interval: float) -> list[Entry]:
-    offset = Entry("offset", term.target, 0.0, OFFSET_LEVELS * level)
-    gain = Entry("gain", term.target, 0.0, GAIN_SCALE, -1, -0.9, 9.0)
-    return {
-        "offset": [offset],
-        "scale": [gain],
-        "affine": [offset, gain],  # about the regression, which is in the term
-        "drift": [Entry("drift", term.target, 0.0, OFFSET_LEVELS * level)],
-        "delay": [Entry("delay", term.target, 0.0, DELAY_INTERVALS * interval)],
-    }.get(term.kind, [])
+OF_TERM: dict[str, tuple[str, ...]] = {
+    "offset": ("offset",),
+    "scale": ("gain",),
+    "affine": ("offset", "gain"),  # about the regression, which is in the term
+    "drift": ("drift",),
+    "delay": ("delay",),
+}
+"""Kind of a term → kinds of the numbers of a sensor that it frees; of an offset from a time on, "step"."""
+
+
+def kinds_of(term: Term) -> tuple[str, ...]:
+    """Return the kinds of the numbers that an error in the data frees."""
+    return ("step",) if term.kind == "offset" and math.isfinite(term.begins) else OF_TERM.get(term.kind, ())
+
+
+def _of_sensor(name: str, model: Model, terms: Terms, level: float, interval: float) -> list[Entry]:
+    """Return the numbers of a sensor that are not fixed: within their tolerances, or free."""
+    sensor = model.channels.get(name)
+    usual = {"offset": sensor.zero, "gain": sensor.scale, "delay": sensor.late} if sensor else {}
+    free = {kind for term in terms if term.is_data_error and term.target == name for kind in kinds_of(term)}
+    wide = {
+        "offset": OFFSET_LEVELS * level,
+        "step": OFFSET_LEVELS * level,
+        "drift": OFFSET_LEVELS * level,
+        "gain": GAIN_SCALE,
+        "delay": DELAY_INTERVALS * interval,
+    }
+    spreads = {kind: math.hypot(usual.get(kind, 0.0), wide[kind] * (kind in free)) for kind in wide}
+    bounds = {"gain": (-0.9, 9.0)}
+    return [
+        Entry(kind, name, 0.0, sd, -1, *bounds.get(kind, (-math.inf, math.inf)))
+        for kind, sd in spreads.items()
+        if sd > 0.0
+    ]

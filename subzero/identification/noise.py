@@ -1,6 +1,9 @@
 """The noise of a channel: a white part with rounding, and a slow part; whitening with it.
 
-    Σ_ij = (σ_w² + q²/12) δ_ij + σ_s² exp(−|t_i − t_j|/τ_s)
+    Σ_ij = (σ_w² + q²/12) n_i δ_ij + σ_s² exp(−|t_i − t_j|/τ_s)
+
+n_i equal readings in a row, the i-th among them, say no more than one: what rounds or holds a value errs by the same in
+all of them.
 
 Σ is never formed: a Kalman filter with the slow part as its state turns a residual into its innovations, which are
 white (Rasmussen & Williams 2006, app. B; Hartikainen & Särkkä 2010).
@@ -82,6 +85,12 @@ def resolution_of(values: np.ndarray) -> float:
     return step if np.max(np.abs(ratio - np.rint(ratio))) < 0.05 else 0.0
 
 
+def equal_in_a_row(values: np.ndarray) -> np.ndarray:
+    """Return how many equal readings in a row each of some readings (m,) is one of (m,)."""
+    begins = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
+    return np.repeat(lengths := np.diff(begins, append=values.size), lengths).astype(float)
+
+
 def level_of(values: np.ndarray, resolution: float) -> float:
     """Return the level of a sensor as its readings (n,) show it: from their second differences, which a slow signal
     hardly has; at least that of its rounding.
@@ -104,12 +113,14 @@ class Filter:
     scale: np.ndarray
 
     @classmethod
-    def of(cls, noise: Noise, resolution: float, times: np.ndarray) -> Filter:
-        """Return the filter at the times of the samples (m,); where they fall, a new record begins. [s]"""
+    def of(cls, noise: Noise, resolution: float, times: np.ndarray, equal: np.ndarray) -> Filter:
+        """Return the filter at the times [s] of samples (m,), each of so many equal ones (m,); where times fall, a new
+        record begins.
+        """
         steps = np.diff(times, append=times[-1:])
         decay = np.where(steps >= 0.0, np.exp(-np.abs(steps) / noise.time), 0.0)
         gain, scale = np.empty(times.size), np.empty(times.size)
-        gains(decay, noise.white**2 + resolution**2 / 12.0, noise.slow**2, gain, scale)
+        gains(decay, (noise.white**2 + resolution**2 / 12.0) * equal, noise.slow**2, gain, scale)
         return cls(decay, gain, scale)
 
     @property
@@ -125,11 +136,11 @@ class Filter:
 
 
 @compiled
-def gains(decay: np.ndarray, white: float, slow: float, gain: np.ndarray, scale: np.ndarray) -> None:
+def gains(decay: np.ndarray, white: np.ndarray, slow: float, gain: np.ndarray, scale: np.ndarray) -> None:
     """Fill the Kalman gain, and the standard deviation of the innovation, of every sample (m,)."""
     left = slow
     for i in range(decay.size):
-        seen = left + white
+        seen = left + white[i]
         gain[i] = left / seen
         scale[i] = np.sqrt(seen)
         # What the sample leaves unknown decays to the next one, and the process adds to it.
@@ -147,3 +158,41 @@ def innovations(
             new = values[i, j] - expected
             white[i, j] = new / scale[i]
             expected = decay[i] * (expected + gain[i] * new)
+
+
+@compiled
+def log_marginal(
+    decay: np.ndarray, gain: np.ndarray, scale: np.ndarray, columns: np.ndarray, G: np.ndarray, row: np.ndarray
+) -> float:
+    """Return the log density of residuals e₀ − K w with w ~ N(0, I), up to a constant, from columns [K e₀] (m, r + 1).
+
+    log p = −½ (e₀ᵀΣ⁻¹e₀ − bᵀH⁻¹b) − ½ log|H| − ½ log|Σ|,   H = I + KᵀΣ⁻¹K,   b = KᵀΣ⁻¹e₀
+
+    G (r + 1, r + 1) and row (2, r + 1) are overwritten.
+    """
+    count, total = columns.shape[1], 0.0
+    expected, white = row[0], row[1]
+    for j in range(count):
+        expected[j] = 0.0
+        for k in range(count):
+            G[j, k] = 1.0 if j == k and j < count - 1 else 0.0
+    for i in range(columns.shape[0]):
+        for j in range(count):
+            new = columns[i, j] - expected[j]
+            white[j] = new / scale[i]
+            expected[j] = decay[i] * (expected[j] + gain[i] * new)
+        for j in range(count):
+            for k in range(j + 1):
+                G[j, k] += white[j] * white[k]
+        total -= np.log(scale[i])
+    # The last row of the Cholesky factor of [H b; bᵀ e₀ᵀΣ⁻¹e₀] leaves the square that w does not explain.
+    for j in range(count):
+        for k in range(j):
+            for i in range(k):
+                G[j, k] -= G[j, i] * G[k, i]
+            G[j, k] /= G[k, k]
+            G[j, j] -= G[j, k] * G[j, k]
+        if j < count - 1:
+            G[j, j] = np.sqrt(G[j, j])
+            total -= np.log(G[j, j])
+    return total - 0.5 * G[-1, -1]

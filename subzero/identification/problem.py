@@ -13,7 +13,7 @@ import numpy as np
 from subzero.errors import UserError
 from subzero.identification.explanation import CLOCK, Entry, Term, Terms, entries_of
 from subzero.identification.model import Model
-from subzero.identification.noise import OPEN_SPREAD, NoisePrior, level_of, resolution_of
+from subzero.identification.noise import OPEN_SPREAD, NoisePrior, equal_in_a_row, level_of, resolution_of
 from subzero.identification.record import Record
 from subzero.identification.simulation import Asked, Runs
 
@@ -21,13 +21,13 @@ STEP = 0.1
 """Step of a sensitivity, over the standard deviation of a number's prior. [-]"""
 FEWEST_SAMPLES = 8
 """A channel with fewer readings in all records is not used."""
-SPIKE = 8.0
-"""A reading so many levels off the median of its neighbours, which agree with one another, is set aside. [-]"""
+SPIKE = 5.0
+"""A reading so many levels off the middle of those next to it, which agree with one another, is set aside. [-]"""
 MAX_KNOTS = 200
 """Most knots of one unknown input in one record: its time is lengthened where there would be more."""
 FIXED = 1e-6
 """Prior standard deviation of a number that is fixed, over its own. [-]"""
-CORRECTIONS = ("offset", "gain", "drift", "delay")
+CORRECTIONS = ("offset", "step", "gain", "drift", "delay")
 """Entries that change the record, not the simulation."""
 
 Progress = Callable[[float, str], None]
@@ -43,6 +43,7 @@ class Readings:
         values: as recorded (m,).
         record: which each belongs to (m,).
         used: which are finite, and no spikes (m,).
+        equal: of how many equal readings in a row each is one (m,).
         prior: of the sensor.
     """
 
@@ -50,6 +51,7 @@ class Readings:
     values: np.ndarray
     record: np.ndarray
     used: np.ndarray
+    equal: np.ndarray
     prior: NoisePrior
 
 
@@ -123,8 +125,11 @@ class Problem:
         steps = np.diff(time)
         spread = OPEN_SPREAD if sensor.noise is None else sensor.spread
         prior = NoisePrior(level, step, float(np.median(steps[steps > 0.0])), spread)
-        used = finite & ~_spikes(values, SPIKE * max(level, step), sensor.turn)
-        return Readings(time, values, of, used, prior)
+        used = finite & ~_spikes(values, SPIKE * float(np.hypot(level, step / np.sqrt(12.0))), sensor.turn)
+        equal = np.ones(values.size)
+        for k, _ in having:
+            equal[used & (of == k)] = equal_in_a_row(values[used & (of == k)])
+        return Readings(time, values, of, used, equal, prior)
 
     @cached_property
     def levels(self) -> dict[str, float]:
@@ -248,20 +253,20 @@ class Problem:
     def shown(
         self, name: str, terms: Terms, entries: Sequence[Entry], x: np.ndarray, simulated: np.ndarray
     ) -> np.ndarray:
-        """Return what a sensor with free errors shows of simulated readings h: a + (1 + g) h + d τ (m,)."""
+        """Return what a sensor with its errors shows of simulated readings h: a + (1 + g) h + d τ + step (m,)."""
         each = self.channels[name]
         free = {
             entry.kind: x[i]
             for i, entry in enumerate(entries)
             if entry.name == name and entry.kind in CORRECTIONS
         }
-        values = simulated.copy()
+        values = free.get("offset", 0.0) + (1.0 + free.get("gain", 0.0)) * simulated
         for term in self._errors(name, terms):
             at = self._where(each, term)
             if term.kind == "drift":
                 values[at] += free["drift"] * self._ramp(each)[at]
-            elif term.slot[0] == "y = a + b x":
-                values[at] = free.get("offset", 0.0) + (1.0 + free.get("gain", 0.0)) * values[at]
+            elif term.kind == "offset" and "step" in free:
+                values[at] += free["step"]
         return values
 
     def _errors(self, name: str, terms: Terms) -> list[Term]:
@@ -375,13 +380,20 @@ def _input(record: Record, name: str) -> np.ndarray:
 
 
 def _spikes(values: np.ndarray, far: float, turn: float) -> np.ndarray:
-    """Return which readings (m,) are alone far from both neighbours, which agree."""
-    found = np.zeros(values.size, dtype=bool)
-    before, after = values[1:-1] - values[:-2], values[1:-1] - values[2:]
+    """Return which readings (m,) are alone far from the four next to them, which agree: the middle two of these differ
+    by less than half as much.
+    """
+    found, at = np.zeros(values.size, dtype=bool), np.flatnonzero(np.isfinite(values))
+    if at.size < 5:
+        return found
+    places = np.arange(at.size)
+    first = np.clip(places - 2, 0, at.size - 5)
+    around = first[:, None] + np.arange(5)
+    around = around[around != places[:, None]].reshape(-1, 4)
+    away = values[at][around] - values[at][:, None]
     if turn:
-        before, after = before - turn * np.rint(before / turn), after - turn * np.rint(after / turn)
-    with np.errstate(invalid="ignore"):
-        apart = np.abs(before - after)
-        found[1:-1] = (np.minimum(np.abs(before), np.abs(after)) > far) & (before * after > 0.0)
-        found[1:-1] &= apart < 0.5 * np.minimum(np.abs(before), np.abs(after))
+        away -= turn * np.rint(away / turn)
+    low, high = np.sort(away, axis=1)[:, 1:3].T
+    off = np.abs(0.5 * (low + high))
+    found[at] = (off > far) & (high - low < 0.5 * off)
     return found

@@ -40,7 +40,7 @@ def test_the_filter_whitens_as_the_dense_covariance_does():
     rng = np.random.default_rng(1)
     time, noise = np.cumsum(rng.uniform(0.05, 0.4, 60)), Noise(0.3, 0.7, 1.5)
     values = rng.standard_normal((60, 2))
-    filtered = Filter.of(noise, 0.0, time)
+    filtered = Filter.of(noise, 0.0, time, np.ones(time.size))
     dense = covariance(noise, time)
     squares = np.sum(filtered.whiten(values) ** 2, axis=0)
     np.testing.assert_allclose(
