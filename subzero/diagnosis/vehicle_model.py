@@ -132,9 +132,14 @@ def _simulate(
 
     def simulate(p: Mapping[str, Any], u: Mapping[str, Any], t: np.ndarray) -> dict[str, np.ndarray]:
         trial, named = int(u[TRIAL][0]), effects.values()
-        whole = {effect.id: [p[_name(effect, each)] for each in effect.parameters] for effect in (*named, *START)}
+        whole = {
+            effect.id: [p[_name(effect, each)] for each in effect.parameters] for effect in (*named, *START)
+        }
         late = {
-            effect.id: (p[effect.id]["since"], [p[effect.id][_name(effect, each)] for each in effect.parameters])
+            effect.id: (
+                p[effect.id]["since"],
+                [p[effect.id][_name(effect, each)] for each in effect.parameters],
+            )
             for effect in named
             if effect.sudden
         }

@@ -209,17 +209,14 @@ def data_terms(model: Model) -> list[Term]:
             (f, sensor.turn * turns, words)
             for f, turns, words in (*KNOWN, *(KNOWN_ANGLES if sensor.angle else ()))
         ]
-        soft = [
-            ("offset", "has an offset"),
-            ("scale", "has an error of scale"),
-            ("affine", "has another scale and zero"),
-        ]
-        soft.append(("drift", "drifts"))
+        soft = [("offset", "has an offset"), ("scale", "has an error of scale"), ("drift", "drifts")]
         if not sensor.logger:  # channels of one logger have one clock
             soft.append(("delay", "is late or early against the inputs"))
         found += [
             Term(f"{kind}:{name}", f"{name} {words}", kind, name, odds / len(soft)) for kind, words in soft
         ]
+        both = odds / len(soft) * PRIOR_NEXT_DATA / len(soft)  # an offset, and then an error of scale
+        found.append(Term(f"affine:{name}", f"{name} has another scale and zero", "affine", name, both))
         found += [
             Term(
                 f"unit:{name}",

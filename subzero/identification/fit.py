@@ -126,7 +126,10 @@ def spreads(entries: Sequence[Entry], levels: Levels) -> np.ndarray:
 
 
 def solve(
-    products: tuple[np.ndarray, np.ndarray, float, float], entries: Sequence[Entry], levels: Levels, off: np.ndarray
+    products: tuple[np.ndarray, np.ndarray, float, float],
+    entries: Sequence[Entry],
+    levels: Levels,
+    off: np.ndarray,
 ) -> tuple[np.ndarray, float, np.ndarray]:
     """Return the step (n,) to the maximum of a linear problem's posterior within bounds, its log evidence, and the
     factor of H = I + D^½ A D^½.
@@ -151,7 +154,9 @@ def solve(
     return sd * z - off, evidence, factor
 
 
-def _within(H: np.ndarray, g: np.ndarray, z: np.ndarray, entries: Sequence[Entry], sd: np.ndarray) -> np.ndarray:
+def _within(
+    H: np.ndarray, g: np.ndarray, z: np.ndarray, entries: Sequence[Entry], sd: np.ndarray
+) -> np.ndarray:
     """Return the minimum of ½ zᵀHz − gᵀz within bounds, from that without: what leaves them is held there, and the rest
     follows.
     """
@@ -176,7 +181,9 @@ def unexplained(problem: Problem, linear: Linear) -> float:
     sd = spreads(linear.entries, linear.levels)
     step, *_ = solve(products, linear.entries, linear.levels, linear.off)
     A, b, ee, _ = products
-    left = ee - 2.0 * float(step @ b) + float(step @ A @ step) + float(np.sum(((linear.off + step) / sd) ** 2))
+    left = (
+        ee - 2.0 * float(step @ b) + float(step @ A @ step) + float(np.sum(((linear.off + step) / sd) ** 2))
+    )
     return float(np.sqrt(left / sum(int(problem.used(name, linear.terms).sum()) for name in linear.e)))
 
 
@@ -255,7 +262,7 @@ def _best_size(problem: Problem, linear: Linear, products: Products, levels: Lev
 def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Levels, name: str) -> Levels:
     """Return levels with the noise of a channel that has the highest evidence, given those of all others."""
     before, prior = levels.noise[name], problem.channels[name].prior
-    samples, columns = _given_others(problem, linear, products, levels, name)
+    samples, columns = given_others(problem, linear, products, levels, name)
     room = np.empty((columns.shape[1], columns.shape[1])), np.empty((2, columns.shape[1]))
 
     def at(log: np.ndarray) -> Noise:
@@ -277,7 +284,7 @@ def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Le
     return replace(levels, noise={**levels.noise, name: at(found.x)}) if better else levels
 
 
-def _given_others(
+def given_others(
     problem: Problem, linear: Linear, products: Products, levels: Levels, name: str
 ) -> tuple[Samples, np.ndarray]:
     """Return the samples of a channel's readings, and [K e₀] (m, r + 1): given all other channels its residual is
@@ -298,7 +305,9 @@ def _given_others(
     kept = s > INVISIBLE * problem.levels[name]
     e0 = e + J @ (linear.off - sd * z)
     each = problem.channels[name]
-    return (each.time[used], each.equal[used]), np.ascontiguousarray(np.column_stack([U[:, kept] * s[kept], e0]))
+    return (each.time[used], each.equal[used]), np.ascontiguousarray(
+        np.column_stack([U[:, kept] * s[kept], e0])
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -342,10 +351,7 @@ def fit(problem: Problem, terms: Terms, start: Mapping[Entry, float], levels: Le
         start: where it begins, of entries that are known there; others begin at the means of their priors.
         levels: noise and sizes at the beginning.
     """
-    entries = problem.entries(terms)
-    known = {entry.identity: value for entry, value in start.items()}
-    x = np.array([known.get(entry.identity, entry.centre) for entry in entries])
-    x = np.clip(x, *bounds(entries))
+    entries, x = _beginning(problem, terms, start)
     linear = origin = _approached(problem, linearised(problem, terms, entries, x, levels))
     best, score, lasting = linear, -np.inf, 0
     for _ in range(ROUNDS):
@@ -360,6 +366,22 @@ def fit(problem: Problem, terms: Terms, start: Mapping[Entry, float], levels: Le
         if lasting == PATIENCE:
             break
     return _finished(problem, best)
+
+
+def can_begin(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> bool:
+    """Return whether the model can be simulated where a fit would begin."""
+    entries, x = _beginning(problem, terms, start)
+    return bool(problem.residuals(terms, entries, [x])[1][0])
+
+
+def _beginning(
+    problem: Problem, terms: Terms, start: Mapping[Entry, float]
+) -> tuple[list[Entry], np.ndarray]:
+    """Return the free numbers of an explanation, and where its fit begins (n,)."""
+    entries = problem.entries(terms)
+    known = {entry.identity: value for entry, value in start.items()}
+    x = np.array([known.get(entry.identity, entry.centre) for entry in entries])
+    return entries, np.clip(x, *bounds(entries))
 
 
 def _is_linear(problem: Problem, origin: Linear, there: Linear) -> bool:

@@ -127,7 +127,11 @@ def _bends(problem: Problem, fitted: Fit) -> dict[str, float]:
     """Return how far parameters that no term names are from their nominal values, in tolerances."""
     tolerance = {("number", number.name): number.tolerance for number in problem.model.shared}
     for name, sensor in problem.model.channels.items():
-        tolerance |= {("offset", name): sensor.zero, ("gain", name): sensor.scale, ("delay", name): sensor.late}
+        tolerance |= {
+            ("offset", name): sensor.zero,
+            ("gain", name): sensor.scale,
+            ("delay", name): sensor.late,
+        }
     named = {
         ("number", name)
         for cause in problem.model.causes

@@ -162,7 +162,12 @@ def innovations(
 
 @compiled
 def log_marginal(
-    decay: np.ndarray, gain: np.ndarray, scale: np.ndarray, columns: np.ndarray, G: np.ndarray, row: np.ndarray
+    decay: np.ndarray,
+    gain: np.ndarray,
+    scale: np.ndarray,
+    columns: np.ndarray,
+    G: np.ndarray,
+    row: np.ndarray,
 ) -> float:
     """Return the log density of residuals e₀ − K w with w ~ N(0, I), up to a constant, from columns [K e₀] (m, r + 1).
 

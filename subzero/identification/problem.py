@@ -125,7 +125,7 @@ class Problem:
         steps = np.diff(time)
         spread = OPEN_SPREAD if sensor.noise is None else sensor.spread
         prior = NoisePrior(level, step, float(np.median(steps[steps > 0.0])), spread)
-        used = finite & ~_spikes(values, SPIKE * float(np.hypot(level, step / np.sqrt(12.0))), sensor.turn)
+        used = finite & ~spikes(values, SPIKE * float(np.hypot(level, step / np.sqrt(12.0))), sensor.turn)
         equal = np.ones(values.size)
         for k, _ in having:
             equal[used & (of == k)] = equal_in_a_row(values[used & (of == k)])
@@ -379,21 +379,19 @@ def _input(record: Record, name: str) -> np.ndarray:
     return np.interp(record.time, at[known], values[known])
 
 
-def _spikes(values: np.ndarray, far: float, turn: float) -> np.ndarray:
-    """Return which readings (m,) are alone far from the four next to them, which agree: the middle two of these differ
-    by less than half as much.
+def spikes(values: np.ndarray, far: float, turn: float) -> np.ndarray:
+    """Return which readings (m,) are alone far from a line, and from a cubic, through those next to them, where these
+    agree: a curve that is sampled coarsely has no spikes, and neither has what stands beside one.
     """
     found, at = np.zeros(values.size, dtype=bool), np.flatnonzero(np.isfinite(values))
     if at.size < 5:
         return found
-    places = np.arange(at.size)
-    first = np.clip(places - 2, 0, at.size - 5)
-    around = first[:, None] + np.arange(5)
-    around = around[around != places[:, None]].reshape(-1, 4)
-    away = values[at][around] - values[at][:, None]
+    at, each = at[2:-2], at[np.arange(at.size - 4)[:, None] + [0, 1, 3, 4]]
+    away = values[each] - values[at][:, None]
     if turn:
         away -= turn * np.rint(away / turn)
-    low, high = np.sort(away, axis=1)[:, 1:3].T
-    off = np.abs(0.5 * (low + high))
-    found[at] = (off > far) & (high - low < 0.5 * off)
+    line, cubic = away @ [0.0, 0.5, 0.5, 0.0], away @ [-1.0 / 6.0, 4.0 / 6.0, 4.0 / 6.0, -1.0 / 6.0]
+    off = np.minimum(np.abs(line), np.abs(cubic))
+    apart = np.maximum(2.0 * np.abs(line - cubic), np.abs(away[:, 1] - away[:, 2]))
+    found[at] = (off > far) & (apart < off)
     return found

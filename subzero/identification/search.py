@@ -13,7 +13,17 @@ import numpy as np
 
 from subzero.identification.candidates import OFF_LEVELS, declared, suggested
 from subzero.identification.explanation import Entry, Term, Terms, log_prior, with_term, without
-from subzero.identification.fit import Fit, Linear, fit, fitted_levels, linearised, quieter, unexplained, usual_levels
+from subzero.identification.fit import (
+    Fit,
+    Linear,
+    can_begin,
+    fit,
+    fitted_levels,
+    linearised,
+    quieter,
+    unexplained,
+    usual_levels,
+)
 from subzero.identification.problem import Problem, Progress
 
 MOST_TERMS = 8
@@ -23,8 +33,7 @@ RANKED_AGAIN, FITTED = 10, 6
 WITHIN = 5.0
 """Explanations within this of the best are expanded, too. [nats]"""
 WORTH, STEP_WORTH = 3.0, 1.0
-"""A term that is ranked to lose more is not fitted; one that is ranked to gain less ends the way from the nominal model.
-[nats]"""
+"""A term that is ranked to lose more is not fitted; one that gains less ends the way from the nominal model. [nats]"""
 OF_MODEL = ("number", "start", "unknown")
 """Kinds of entries that every explanation has."""
 TWINS = ("offset", "scale", "affine", "delay")
@@ -148,8 +157,9 @@ class Search:
         fitted = fit(self.problem, terms, values, start.levels)
         if self.score(fitted) < promised - WORTH:
             own = {entry: value for entry, value in values.items() if entry.kind not in OF_MODEL}
-            again = fit(self.problem, terms, own, usual_levels(self.problem))
-            fitted = max(fitted, again, key=self.score)
+            if can_begin(self.problem, terms, own):
+                again = fit(self.problem, terms, own, usual_levels(self.problem))
+                fitted = max(fitted, again, key=self.score)
         if name not in self.fits or fitted.log_evidence > self.fits[name].log_evidence:
             self.fits[name] = fitted
         return self.fits[name]
@@ -186,7 +196,10 @@ class Search:
         """Yield the best, ranked with the noise of the explanation that they are added to, and with usual noise: what a
         term would explain may be part of the former.
         """
-        quiet = [(self._linear_score(replace(each, levels=quieter(self.problem, each.levels))), each) for _, each in ranked]
+        quiet = [
+            (self._linear_score(replace(each, levels=quieter(self.problem, each.levels))), each)
+            for _, each in ranked
+        ]
         quiet.sort(key=lambda pair: -pair[0])
         found: dict[Key, Linear] = {}
         for order in (ranked, quiet):
