@@ -359,7 +359,7 @@ def _sizes(problem: Problem, linear: object, term: Term) -> list[tuple[str, floa
 def _notes(problem: Problem, search: Search) -> tuple[str, ...]:
     found = []
     for name, each in problem.channels.items():
-        spikes = int((np.isfinite(each.values) & ~each.used).sum())
+        spikes = int(each.spikes.sum())
         if spikes:
             why = "outside the record's time, or alone far from both neighbours"
             found.append(f"{name}: {spikes} readings are set aside: {why}.")

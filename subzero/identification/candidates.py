@@ -172,7 +172,7 @@ def _stuck(problem: Problem, name: str, simulated: np.ndarray) -> Iterator[Term]
     """Yield the longest run of equal readings in each record, while the simulation moves."""
     each, sensor = problem.channels[name], problem.model.channels[name]
     for record in np.unique(each.record).tolist():
-        at = np.flatnonzero(each.used & (each.record == record))
+        at = np.flatnonzero(np.isfinite(each.values) & ~each.spikes & (each.record == record))
         values = each.values[at]
         ends = np.flatnonzero(np.diff(values, append=np.nan) != 0.0)
         starts = np.concatenate([[0], ends[:-1] + 1])

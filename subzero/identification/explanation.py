@@ -28,8 +28,9 @@ TUNED_WIDER = 10.0
 evidence on that channel. [-]"""
 GAIN_SCALE = 0.1
 """Usual error of the scale of a sensor (one standard deviation). [-]"""
-OFFSET_LEVELS, DELAY_INTERVALS = 30.0, 5.0
-"""Usual error of an offset or a drift, in levels of the sensor; of a delay, in sampling intervals. [-]"""
+BEYOND, OFFSET_LEVELS, DELAY_INTERVALS = 10.0, 30.0, 5.0
+"""Usual error of an offset or a drift, in tolerances of the sensor's zero, or in its levels where none is declared; of
+a delay, in sampling intervals. [-]"""
 
 PRIOR_CAUSE, MOST_LIKELY, PRIOR_TOLERANCES, PRIOR_DATA, PRIOR_NEXT_DATA = 0.5, 0.05, 0.1, 0.1, 0.3
 """Prior odds that any one cause acts, and most of a single one; that tolerances are too narrow; that the readings of a
@@ -327,11 +328,12 @@ def _of_sensor(name: str, model: Model, terms: Terms, level: float, interval: fl
     """Return the numbers of a sensor that are not fixed: within their tolerances, or free."""
     sensor = model.channels.get(name)
     usual = {"offset": sensor.zero, "gain": sensor.scale, "delay": sensor.late} if sensor else {}
+    off = BEYOND * sensor.zero if sensor and sensor.zero else OFFSET_LEVELS * level
     free = {kind for term in terms if term.is_data_error and term.target == name for kind in kinds_of(term)}
     wide = {
-        "offset": OFFSET_LEVELS * level,
-        "step": OFFSET_LEVELS * level,
-        "drift": OFFSET_LEVELS * level,
+        "offset": off,
+        "step": off,
+        "drift": off,
         "gain": GAIN_SCALE,
         "delay": DELAY_INTERVALS * interval,
     }

@@ -33,6 +33,8 @@ TEMPER, APPROACHING = 0.3, 0.03
 """Noise on the way from afar, over the residual; a smaller share gained of every channel ends it. [-]"""
 ENOUGH = 0.05
 """A step that gains less log posterior ends them. [nats]"""
+TIMES_TRIED = (3.0, 10.0, 50.0)
+"""Correlation times that are tried first, in sampling intervals: a short and a long one are maxima of their own. [-]"""
 INVISIBLE = 1e-3
 """A direction that moves all readings of a channel together by less, in levels of its sensor, is none. [-]"""
 SIZE_RANGE = (-5.0, 6.0)
@@ -85,8 +87,8 @@ class Products:
         """Return [J e]ᵀ Σ⁻¹ [J e] and the log scale of a channel with a noise."""
         if (name, noise) not in self._parts:
             G, log_scale = np.zeros((self._size, self._size)), 0.0
-            for places, (times, equal), columns in self._blocks[name]:
-                filtered = Filter.of(noise, self._resolutions[name], times, equal)
+            for places, times, columns in self._blocks[name]:
+                filtered = Filter.of(noise, self._resolutions[name], times)
                 white = filtered.whiten(columns)
                 G[np.ix_(places, places)] += white.T @ white
                 log_scale += filtered.log_scale + 0.5 * times.size * np.log(2.0 * np.pi)
@@ -100,10 +102,8 @@ class Products:
         return G[:-1, :-1], G[:-1, -1], float(G[-1, -1]), sum(part[1] for part in parts)
 
 
-Samples = tuple[np.ndarray, np.ndarray]
-"""Times (m,) [s], and of how many equal readings in a row each is one (m,)."""
-Block = tuple[np.ndarray, Samples, np.ndarray]
-"""Of a channel in one record: places of the columns that are not 0 (k,), samples, columns (m, k)."""
+Block = tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Of a channel in one record: places of the columns that are not 0 (k,), times (m,), columns (m, k)."""
 
 
 def _blocks(problem: Problem, name: str, terms: Terms, J: np.ndarray, e: np.ndarray) -> list[Block]:
@@ -114,7 +114,7 @@ def _blocks(problem: Problem, name: str, terms: Terms, J: np.ndarray, e: np.ndar
         at = used & (each.record == record)
         columns = np.column_stack([J[at], e[at]])
         places = np.flatnonzero(np.append(columns[:, :-1].any(axis=0), True))
-        found.append((places, (each.time[at], each.equal[at]), np.ascontiguousarray(columns[:, places])))
+        found.append((places, each.time[at], np.ascontiguousarray(columns[:, places])))
     return found
 
 
@@ -262,7 +262,7 @@ def _best_size(problem: Problem, linear: Linear, products: Products, levels: Lev
 def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Levels, name: str) -> Levels:
     """Return levels with the noise of a channel that has the highest evidence, given those of all others."""
     before, prior = levels.noise[name], problem.channels[name].prior
-    samples, columns = given_others(problem, linear, products, levels, name)
+    times, columns = given_others(problem, linear, products, levels, name)
     room = np.empty((columns.shape[1], columns.shape[1])), np.empty((2, columns.shape[1]))
 
     def at(log: np.ndarray) -> Noise:
@@ -274,20 +274,25 @@ def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Le
         density = prior.log_density(noise)
         if not np.isfinite(density):
             return 1e300
-        given = Filter.of(noise, prior.resolution, *samples)
+        given = Filter.of(noise, prior.resolution, times)
         return -log_marginal(given.decay, given.gain, given.scale, columns, *room) - density
 
-    start = np.vstack([np.zeros(3), np.diag([0.3, -0.5, 0.7])])
-    options = {"initial_simplex": start, "maxfev": 60, "xatol": 0.02, "fatol": ENOUGH}
-    found = minimize(negative, np.zeros(3), method="Nelder-Mead", options=options)
+    lasting = np.log(
+        np.array([before.time, *(share * prior.interval for share in TIMES_TRIED)]) / before.time
+    )
+    begin = np.column_stack([np.zeros((lasting.size, 2)), lasting])
+    best = begin[int(np.argmin([negative(each) for each in begin]))]
+    simplex = best + np.vstack([np.zeros(3), np.diag([0.3, -0.5, 0.7])])
+    options = {"initial_simplex": simplex, "maxfev": 60, "xatol": 0.02, "fatol": ENOUGH}
+    found = minimize(negative, best, method="Nelder-Mead", options=options)
     better = found.fun <= negative(np.zeros(3))
     return replace(levels, noise={**levels.noise, name: at(found.x)}) if better else levels
 
 
 def given_others(
     problem: Problem, linear: Linear, products: Products, levels: Levels, name: str
-) -> tuple[Samples, np.ndarray]:
-    """Return the samples of a channel's readings, and [K e₀] (m, r + 1): given all other channels its residual is
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the times of a channel's readings (m,), and [K e₀] (m, r + 1): given all other channels its residual is
     e₀ − K w with w ~ N(0, I), whatever its own noise. Directions that move no reading visibly are left out.
     """
     others = {other: noise for other, noise in levels.noise.items() if other != name and other in linear.e}
@@ -304,8 +309,7 @@ def given_others(
     U, s, _ = np.linalg.svd(K, full_matrices=False)
     kept = s > INVISIBLE * problem.levels[name]
     e0 = e + J @ (linear.off - sd * z)
-    each = problem.channels[name]
-    return (each.time[used], each.equal[used]), np.ascontiguousarray(
+    return problem.channels[name].time[used], np.ascontiguousarray(
         np.column_stack([U[:, kept] * s[kept], e0])
     )
 
@@ -500,8 +504,8 @@ def _negative_log_posterior(problem: Problem, linear: Linear) -> float:
     total = -problem.log_jacobian(linear.terms)
     for name, e in linear.e.items():
         each = problem.channels[name]
-        for _, samples, columns in _blocks(problem, name, linear.terms, np.empty((e.size, 0)), e):
-            filtered = Filter.of(linear.levels.noise[name], each.prior.resolution, *samples)
+        for _, times, columns in _blocks(problem, name, linear.terms, np.empty((e.size, 0)), e):
+            filtered = Filter.of(linear.levels.noise[name], each.prior.resolution, times)
             total += 0.5 * float(np.sum(filtered.whiten(columns) ** 2))
     return total + 0.5 * float(np.sum((linear.off / spreads(linear.entries, linear.levels)) ** 2))
 

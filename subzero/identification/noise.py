@@ -1,9 +1,8 @@
 """The noise of a channel: a white part with rounding, and a slow part; whitening with it.
 
-    Σ_ij = (σ_w² + q²/12) n_i δ_ij + σ_s² exp(−|t_i − t_j|/τ_s)
+    Σ_ij = (σ_w² + q²/12) δ_ij + σ_s² exp(−|t_i − t_j|/τ_s)
 
-n_i equal readings in a row, the i-th among them, say no more than one: what rounds or holds a value errs by the same in
-all of them.
+Of equal readings in a row the middle one is used: what rounds or holds a value errs by the same in all of them.
 
 Σ is never formed: a Kalman filter with the slow part as its state turns a residual into its innovations, which are
 white (Rasmussen & Williams 2006, app. B; Hartikainen & Särkkä 2010).
@@ -23,6 +22,8 @@ BINDING = 5.0
 """A level binds: σ_w is no farther from it, in standard deviations of its logarithm. [-]"""
 SLOW_SHARE, SLOW_SPREAD = 0.3, 0.7
 """Usual slow part of a sensor, over its level, and the standard deviation of its logarithm. [-]"""
+SLOWEST_WHITE = 2.0
+"""A part whose τ_s is less, in sampling intervals, is white. [-]"""
 TIME_SPREAD = 1.0
 """Standard deviation of log τ_s about ten sampling intervals. [-]"""
 FLOOR_SHARE = 1e-6
@@ -65,7 +66,8 @@ class NoisePrior:
 
     def log_density(self, noise: Noise) -> float:
         """Return the log prior density of a noise, up to a constant."""
-        if noise.slow > self.most or abs(np.log(noise.white / self.level)) > BINDING * self.spread:
+        binds = noise.slow > self.most or abs(np.log(noise.white / self.level)) > BINDING * self.spread
+        if binds or noise.time < SLOWEST_WHITE * self.interval:
             return -np.inf
         off = (
             np.log(noise.white / self.level) / self.spread,
@@ -85,10 +87,12 @@ def resolution_of(values: np.ndarray) -> float:
     return step if np.max(np.abs(ratio - np.rint(ratio))) < 0.05 else 0.0
 
 
-def equal_in_a_row(values: np.ndarray) -> np.ndarray:
-    """Return how many equal readings in a row each of some readings (m,) is one of (m,)."""
+def middle_of_equal(values: np.ndarray) -> np.ndarray:
+    """Return which of some readings (m,) are the middle of equal ones in a row, or differ from both neighbours."""
     begins = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
-    return np.repeat(lengths := np.diff(begins, append=values.size), lengths).astype(float)
+    found = np.zeros(values.size, dtype=bool)
+    found[(begins + np.append(begins[1:], values.size)) // 2] = True
+    return found
 
 
 def level_of(values: np.ndarray, resolution: float) -> float:
@@ -113,14 +117,12 @@ class Filter:
     scale: np.ndarray
 
     @classmethod
-    def of(cls, noise: Noise, resolution: float, times: np.ndarray, equal: np.ndarray) -> Filter:
-        """Return the filter at the times [s] of samples (m,), each of so many equal ones (m,); where times fall, a new
-        record begins.
-        """
+    def of(cls, noise: Noise, resolution: float, times: np.ndarray) -> Filter:
+        """Return the filter at the times of the samples (m,); where they fall, a new record begins. [s]"""
         steps = np.diff(times, append=times[-1:])
         decay = np.where(steps >= 0.0, np.exp(-np.abs(steps) / noise.time), 0.0)
         gain, scale = np.empty(times.size), np.empty(times.size)
-        gains(decay, (noise.white**2 + resolution**2 / 12.0) * equal, noise.slow**2, gain, scale)
+        gains(decay, noise.white**2 + resolution**2 / 12.0, noise.slow**2, gain, scale)
         return cls(decay, gain, scale)
 
     @property
@@ -136,11 +138,11 @@ class Filter:
 
 
 @compiled
-def gains(decay: np.ndarray, white: np.ndarray, slow: float, gain: np.ndarray, scale: np.ndarray) -> None:
+def gains(decay: np.ndarray, white: float, slow: float, gain: np.ndarray, scale: np.ndarray) -> None:
     """Fill the Kalman gain, and the standard deviation of the innovation, of every sample (m,)."""
     left = slow
     for i in range(decay.size):
-        seen = left + white[i]
+        seen = left + white
         gain[i] = left / seen
         scale[i] = np.sqrt(seen)
         # What the sample leaves unknown decays to the next one, and the process adds to it.

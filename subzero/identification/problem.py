@@ -13,7 +13,7 @@ import numpy as np
 from subzero.errors import UserError
 from subzero.identification.explanation import CLOCK, Entry, Term, Terms, entries_of
 from subzero.identification.model import Model
-from subzero.identification.noise import OPEN_SPREAD, NoisePrior, equal_in_a_row, level_of, resolution_of
+from subzero.identification.noise import OPEN_SPREAD, NoisePrior, level_of, middle_of_equal, resolution_of
 from subzero.identification.record import Record
 from subzero.identification.simulation import Asked, Runs
 
@@ -42,16 +42,16 @@ class Readings:
         time: of each (m,). [s]
         values: as recorded (m,).
         record: which each belongs to (m,).
-        used: which are finite, and no spikes (m,).
-        equal: of how many equal readings in a row each is one (m,).
+        spikes: which are alone far from their neighbours, or outside the record's time (m,).
+        used: which are finite, no spikes, and the middle of equal ones in a row (m,).
         prior: of the sensor.
     """
 
     time: np.ndarray
     values: np.ndarray
     record: np.ndarray
+    spikes: np.ndarray
     used: np.ndarray
-    equal: np.ndarray
     prior: NoisePrior
 
 
@@ -125,11 +125,13 @@ class Problem:
         steps = np.diff(time)
         spread = OPEN_SPREAD if sensor.noise is None else sensor.spread
         prior = NoisePrior(level, step, float(np.median(steps[steps > 0.0])), spread)
-        used = finite & ~spikes(values, SPIKE * float(np.hypot(level, step / np.sqrt(12.0))), sensor.turn)
-        equal = np.ones(values.size)
+        far = SPIKE * float(np.hypot(level, step / np.sqrt(12.0)))
+        aside = np.isfinite(values) & (~inside | spikes(values, far, sensor.turn))
+        used = finite & ~aside
         for k, _ in having:
-            equal[used & (of == k)] = equal_in_a_row(values[used & (of == k)])
-        return Readings(time, values, of, used, equal, prior)
+            at = np.flatnonzero(used & (of == k))
+            used[at] = middle_of_equal(values[at])
+        return Readings(time, values, of, aside, used, prior)
 
     @cached_property
     def levels(self) -> dict[str, float]:

@@ -90,7 +90,7 @@ class Noise:
         # The last step is 0: there is no next sample, and that decay is not used.
         kept = np.exp(-np.diff(self.time, append=self.time[-1:]) / self.correlation_time)
         gain, scale = np.empty(self.count), np.empty(self.count)
-        gains_of(kept, np.full(kept.size, self.unrelated), self.slow**2, gain, scale)
+        gains_of(kept, self.unrelated, self.slow**2, gain, scale)
         return kept, gain, scale
 
     @property
