@@ -126,12 +126,24 @@ class Problem:
         spread = OPEN_SPREAD if sensor.noise is None else sensor.spread
         prior = NoisePrior(level, step, float(np.median(steps[steps > 0.0])), spread)
         far = SPIKE * float(np.hypot(level, step / np.sqrt(12.0)))
-        aside = np.isfinite(values) & (~inside | spikes(values, far, sensor.turn))
+        away = self._wrapped(name, values - self._at_nominal(name, having))
+        aside = np.isfinite(values) & (~inside | spikes(values, far, sensor.turn) | spikes_at_ends(away, far))
         used = finite & ~aside
         for k, _ in having:
             at = np.flatnonzero(used & (of == k))
             used[at] = middle_of_equal(values[at])
         return Readings(time, values, of, aside, used, prior)
+
+    def _at_nominal(self, name: str, having: Sequence[tuple[int, Record]]) -> np.ndarray:
+        """Return what the nominal model shows of a channel at its times in some records (m,); NaN where it fails."""
+        found = []
+        for k, record in having:
+            unknown = {each.name: np.zeros(record.time.size) for each in self.model.unknown}
+            (readings,) = self.runs[k].readings([Asked(self._nominal, unknown)])
+            times = record.times_of(name)
+            shown = np.interp(times, record.time, readings[name]) if readings else np.full(times.size, np.nan)
+            found.append(shown)
+        return np.concatenate(found)
 
     @cached_property
     def levels(self) -> dict[str, float]:
@@ -383,7 +395,8 @@ def _input(record: Record, name: str) -> np.ndarray:
 
 def spikes(values: np.ndarray, far: float, turn: float) -> np.ndarray:
     """Return which readings (m,) are alone far from a line, and from a cubic, through those next to them, where these
-    agree: a curve that is sampled coarsely has no spikes, and neither has what stands beside one.
+    agree: a curve that is sampled coarsely has no spikes, and neither has what stands beside one. Of two side by side
+    each is twice as far from six neighbours, most of which agree.
     """
     found, at = np.zeros(values.size, dtype=bool), np.flatnonzero(np.isfinite(values))
     if at.size < 5:
@@ -396,4 +409,29 @@ def spikes(values: np.ndarray, far: float, turn: float) -> np.ndarray:
     off = np.minimum(np.abs(line), np.abs(cubic))
     apart = np.maximum(2.0 * np.abs(line - cubic), np.abs(away[:, 1] - away[:, 2]))
     found[at] = (off > far) & (apart < off)
+    return found | _pairs(values, 2.0 * far, turn)
+
+
+def _pairs(values: np.ndarray, far: float, turn: float) -> np.ndarray:
+    """Return which readings (m,) are far from the median of the six next to them, the middle four of which agree."""
+    found, at = np.zeros(values.size, dtype=bool), np.flatnonzero(np.isfinite(values))
+    if at.size < 7:
+        return found
+    each, at = at[np.arange(at.size - 6)[:, None] + [0, 1, 2, 4, 5, 6]], at[3:-3]
+    away = values[each] - values[at][:, None]
+    if turn:
+        away -= turn * np.rint(away / turn)
+    ordered = np.sort(away, axis=1)
+    off = np.abs(np.median(ordered, axis=1))
+    found[at] = (off > far) & (ordered[:, 4] - ordered[:, 1] < 0.25 * off)
+    return found
+
+
+def spikes_at_ends(away: np.ndarray, far: float) -> np.ndarray:
+    """Return which of the first and last two of residuals (m,) are far from the four next to them, which agree."""
+    found, at = np.zeros(away.size, dtype=bool), np.flatnonzero(np.isfinite(away))
+    for ends in (at, at[::-1]) if at.size > 5 else ():
+        beside = away[ends[2:6]]
+        off = np.abs(away[ends[:2]] - np.median(beside))
+        found[ends[:2]] |= (off > far) & (np.ptp(beside) < 0.5 * off)
     return found

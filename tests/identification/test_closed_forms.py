@@ -19,7 +19,7 @@ from subzero.identification.noise import (
     middle_of_equal,
     resolution_of,
 )
-from subzero.identification.problem import Problem, spikes
+from subzero.identification.problem import Problem, spikes, spikes_at_ends
 
 
 def line(p, u, t):
@@ -223,6 +223,10 @@ def test_a_spike_is_set_aside_beside_a_gap_and_a_corner_is_not():
     assert np.flatnonzero(spikes(values, 0.5, 0.0)).tolist() == [3]
     heading = np.array([358.0, 359.0, 0.0, 1.0, 90.0, 2.0, 3.0])
     assert np.flatnonzero(spikes(heading, 5.0, 360.0)).tolist() == [4]
+    pair = np.array([0.0, 0.1, 0.0, 5.0, 5.1, 0.0, 0.1, 0.0, 0.1])
+    assert np.flatnonzero(spikes(pair, 0.5, 0.0)).tolist() == [3, 4]
+    away = np.array([0.1, 4.0, 0.0, 0.1, -0.1, 0.1, 0.0, -4.0])
+    assert np.flatnonzero(spikes_at_ends(away, 0.5)).tolist() == [1, 7]
 
 
 def test_the_usual_errors_of_a_sensor_are_part_of_every_explanation():
