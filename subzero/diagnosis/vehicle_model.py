@@ -11,23 +11,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from subzero import identification as general
 from subzero.channels import BY_NAME, HEADING
 from subzero.diagnosis.hypothesis.catalogue import SPECS, START, catalogue
+from subzero.diagnosis.hypothesis.catalogue.sensors import SCALE
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import moves_nothing, with_tolerances
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.simulator import economical, respond
+from subzero.diagnosis.inference.simulator import Stop, Track, economical, read, simulate_on, with_stops
 from subzero.errors import UserError
 from subzero.external_force import AXES, MissingForce
 
-NOT_PHYSICAL = ("sensors", "clock")
-"""Slots of effects that are errors in the data."""
+OF_ANY_MODEL = ("sensor_bias", "sensor_scale", "clock_offset")
+"""Effects that `Sensor` and errors in the data say."""
 KNOWN_SPREAD, USUAL_SPREAD = 0.1, 0.7
 """Standard deviation of the logarithm of a sensor's level: given by the user, or that of usual sensors. [-]"""
 TRIAL = "trial"
@@ -36,6 +37,8 @@ AXIS_SIZES = {"X": 0.02, "Y": 0.02, "Z": 0.02, "K": 0.0005, "M": 0.002, "N": 0.0
 """Usual size of what the hull's equations miss, by axis: some per cent of the drag at 1 m/s. [N, N m]"""
 AXIS_TIME_S = 4.0
 """Over which it changes. [s]"""
+STOPS, SIMULATIONS_KEPT = 10, 8
+"""A simulation can be taken up at so many times less one; so many of the latest are kept."""
 
 
 def vehicle_model(
@@ -55,7 +58,7 @@ def vehicle_model(
             raise UserError(f"there is no axis {axis!r}. Allowed: {', '.join(AXES)}.")
     settings = [economical(each.setting, float(each.record.time[-1])) for each in logged]
     channels = list(dict.fromkeys(name for each in logged for name in each.record.values if name in SPECS))
-    effects = _effects(settings[0])
+    effects = _effects(settings[0], channels)
     noise = {name: level for each in logged for name, level in each.noise.items()}
     trusted = {name for each in logged for name in each.trusted}
     model = general.Model(
@@ -77,14 +80,16 @@ def vehicle_model(
     return model, records
 
 
-def _effects(setting: Setting) -> dict[str, Effect]:
-    """Return the physical effects that are possible in a trial and change something in it."""
+def _effects(setting: Setting, channels: Sequence[str]) -> dict[str, Effect]:
+    """Return the effects that are possible in a trial and change something in it."""
     slots = () if setting.tethered else ("cable", "drum")
     drum = ("drum",) if setting.model.winch is not None else ()
     return {
         effect.id: replace(effect, parameters=tuple(p.within(setting) for p in effect.parameters))
-        for effect in (with_tolerances(each, setting) for each in catalogue(()).values())
-        if effect.slot not in (*NOT_PHYSICAL, *slots, *drum) and not moves_nothing(effect, setting)
+        for effect in (with_tolerances(each, setting) for each in catalogue(channels).values())
+        if effect.slot not in (*slots, *drum)
+        and effect.id.partition(":")[0] not in OF_ANY_MODEL
+        and not moves_nothing(effect, setting)
     }
 
 
@@ -112,6 +117,8 @@ def _sensor(name: str, noise: Mapping[str, float], trusted: set[str]) -> general
         spread=KNOWN_SPREAD if name in noise else USUAL_SPREAD,
         unit=BY_NAME[name].unit.replace("degree", "deg"),
         angle=name == HEADING,
+        zero=SPECS[name].bias,
+        scale=SCALE[0],
         trusted=name in trusted,
         logger="vehicle",
     )
@@ -121,22 +128,84 @@ def _simulate(
     settings: Sequence[Setting], effects: Mapping[str, Effect], channels: Sequence[str]
 ) -> general.model.Simulate:
     """Return the function of the model: what the sensors of a trial would show."""
+    kept = _Simulations()
 
     def simulate(p: Mapping[str, Any], u: Mapping[str, Any], t: np.ndarray) -> dict[str, np.ndarray]:
-        setting = settings[int(u[TRIAL][0])]
-        for effect in (*effects.values(), *START):
-            values = [p[_name(effect, each)] for each in effect.parameters]
-            if any(values):
-                setting = effect.apply(setting, *values)
-        for effect in effects.values():
-            from_then_on = p.get(effect.id, {})
-            values = [from_then_on.get(_name(effect, each), 0.0) for each in effect.parameters]
-            if any(values):
-                setting = with_onset(effect, from_then_on["since"]).apply(setting, *values)
+        trial, named = int(u[TRIAL][0]), effects.values()
+        whole = {
+            effect.id: [p[_name(effect, each)] for each in effect.parameters] for effect in (*named, *START)
+        }
+        late = {
+            effect.id: (
+                p[effect.id]["since"],
+                [p[effect.id][_name(effect, each)] for each in effect.parameters],
+            )
+            for effect in named
+            if effect.sudden
+        }
         force = np.column_stack([u.get(axis, np.zeros(t.size)) for axis in AXES])
+        asked = _Asked(
+            trial,
+            {effect.id: tuple(whole[effect.id]) for effect in (*named, *START) if effect.slot != "sensors"},
+            {id: (since, *values) for id, (since, values) in late.items() if any(values)},
+            t,
+            force,
+        )
+        setting = settings[trial]
+        for effect in (*named, *START):
+            if any(whole[effect.id]):
+                setting = effect.apply(setting, *whole[effect.id])
+        for id, (since, *values) in asked.late.items():
+            setting = with_onset(effects[id], since).apply(setting, *values)
         if force.any():
             missing = MissingForce(time=tuple(t.tolist()), wrench=tuple(map(tuple, force.tolist())))
             setting = setting.with_model(missing=missing + setting.model.missing)
-        return respond(setting, t, channels)
+        return read(setting, kept.track(asked, setting), t, channels)
 
     return simulate
+
+
+class _Asked(NamedTuple):
+    """A simulation: the trial, deviations of effects that hold throughout, (onset, deviations) of the others, and the
+    force (n, 6) on the hull at times (n,).
+    """
+
+    trial: int
+    throughout: dict[str, tuple[float, ...]]
+    late: dict[str, tuple[float, ...]]
+    time: np.ndarray
+    force: np.ndarray
+
+    def same_until(self, other: _Asked) -> float:
+        """Return the time until which another simulation is the same. [s]"""
+        if (self.trial, self.throughout) != (other.trial, other.throughout):
+            return -np.inf
+        onsets = [since for _, (since, *_) in {*self.late.items()} ^ {*other.late.items()}]
+        if not (self.force.any() or other.force.any()):
+            return min(onsets, default=np.inf)
+        if not np.array_equal(self.time, other.time):
+            return -np.inf
+        changed = np.flatnonzero((self.force != other.force).any(axis=1))
+        return min([*onsets, *self.time[np.maximum(changed[:1] - 1, 0)].tolist()], default=np.inf)
+
+
+class _Simulations:
+    """Latest whole simulations, with how they were at some times: another goes on from where it begins to differ."""
+
+    def __init__(self) -> None:
+        self._kept: list[tuple[_Asked, Track, dict[float, Stop]]] = []
+
+    def track(self, asked: _Asked, setting: Setting) -> Track:
+        """Return the track of a simulation."""
+        same = [asked.same_until(other) for other, *_ in self._kept]
+        best = int(np.argmax(same)) if same else -1
+        if same and same[best] == np.inf:
+            return self._kept[best][1]
+        times = [time for time in self._kept[best][2] if time <= same[best]] if same else []
+        if times:
+            return simulate_on(setting, self._kept[best][2][max(times)])
+        step = setting.trial.cable_step
+        grid = np.rint(np.arange(1, STOPS) * setting.trial.duration / STOPS / step) * step
+        track, stops = with_stops(setting, grid.tolist())
+        self._kept = [*self._kept[1 - SIMULATIONS_KEPT :], (asked, track, stops)]
+        return track

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from subzero.arguments import checked_arguments
 from subzero.identification.candidates import declared
-from subzero.identification.explanation import Entry, Term, Terms, with_term
+from subzero.identification.explanation import Entry, Term, Terms, kinds_of, with_term
 from subzero.identification.fit import Fit, free_fit
 from subzero.identification.locks import Locks, locks
 from subzero.identification.model import Model
@@ -168,7 +168,7 @@ def _estimates(problem: Problem, best: Fit, term: Term) -> tuple[Estimate, ...]:
             name = f"{entry.name}.since" if entry.kind == "since" else entry.name
             off = cause.off.get(entry.name.partition(".")[2], entry.centre) if cause else entry.centre
             found.append(Estimate(name, value, math.sqrt(variance), off))
-        elif term.is_data_error and entry.name == term.target:
+        elif term.is_data_error and entry.name == term.target and entry.kind in kinds_of(term):
             found += _of_data_error(term, entry, value, math.sqrt(variance))
     if term.kind == "unit":
         found = [Estimate("factor", term.factor, 0.0, 1.0), Estimate("offset", term.offset, 0.0, 0.0)]
@@ -180,7 +180,7 @@ def _of_data_error(term: Term, entry: Entry, value: float, sd: float) -> list[Es
         return [Estimate("factor", term.factor * (1.0 + value), abs(term.factor) * sd, 1.0)]
     if entry.kind == "offset" and term.slot[0] == "y = a + b x":
         return [Estimate("offset", term.offset + term.factor * value, abs(term.factor) * sd, 0.0)]
-    return [Estimate(entry.kind, value, sd, 0.0)] if entry.kind == term.kind else []
+    return [Estimate(entry.kind, value, sd, 0.0)]
 
 
 def _shown(ranked: Sequence[Fit], probabilities: np.ndarray) -> dict[str, float]:
@@ -342,7 +342,7 @@ def _sizes(problem: Problem, linear: object, term: Term) -> list[tuple[str, floa
     found = []
     for i, entry in enumerate(linear.entries):
         mine = (
-            entry.name == term.target
+            entry.name == term.target and entry.kind in kinds_of(term)
             if term.is_data_error
             else bool(cause) and entry.name in (cause.changes if cause else ())
         )
@@ -359,7 +359,7 @@ def _sizes(problem: Problem, linear: object, term: Term) -> list[tuple[str, floa
 def _notes(problem: Problem, search: Search) -> tuple[str, ...]:
     found = []
     for name, each in problem.channels.items():
-        spikes = int((np.isfinite(each.values) & ~each.used).sum())
+        spikes = int(each.spikes.sum())
         if spikes:
             why = "outside the record's time, or alone far from both neighbours"
             found.append(f"{name}: {spikes} readings are set aside: {why}.")

@@ -95,7 +95,9 @@ def _of_channel(problem: Problem, linear: Linear, name: str, own: list[Term]) ->
 
 def _delays(problem: Problem, linear: Linear, name: str, own: list[Term]) -> Iterator[Term]:
     """Yield a delay of a channel that begins at the delay which leaves least of it."""
-    (term,) = [term for term in own if term.kind == "delay"]
+    term = next((term for term in own if term.kind == "delay"), None)
+    if term is None:
+        return
     terms = with_term(linear.terms, term)
     entries = problem.entries(terms)
     (place,) = [i for i, entry in enumerate(entries) if entry.kind == "delay" and entry.name == name]
@@ -170,7 +172,7 @@ def _stuck(problem: Problem, name: str, simulated: np.ndarray) -> Iterator[Term]
     """Yield the longest run of equal readings in each record, while the simulation moves."""
     each, sensor = problem.channels[name], problem.model.channels[name]
     for record in np.unique(each.record).tolist():
-        at = np.flatnonzero(each.used & (each.record == record))
+        at = np.flatnonzero(np.isfinite(each.values) & ~each.spikes & (each.record == record))
         values = each.values[at]
         ends = np.flatnonzero(np.diff(values, append=np.nan) != 0.0)
         starts = np.concatenate([[0], ends[:-1] + 1])

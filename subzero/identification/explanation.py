@@ -28,8 +28,9 @@ TUNED_WIDER = 10.0
 evidence on that channel. [-]"""
 GAIN_SCALE = 0.1
 """Usual error of the scale of a sensor (one standard deviation). [-]"""
-OFFSET_LEVELS, DELAY_INTERVALS = 30.0, 5.0
-"""Usual error of an offset or a drift, in levels of the sensor; of a delay, in sampling intervals. [-]"""
+BEYOND, OFFSET_LEVELS, DELAY_INTERVALS = 10.0, 30.0, 5.0
+"""Usual error of an offset or a drift, in tolerances of the sensor's zero, or in its levels where none is declared; of
+a delay, in sampling intervals. [-]"""
 
 PRIOR_CAUSE, MOST_LIKELY, PRIOR_TOLERANCES, PRIOR_DATA, PRIOR_NEXT_DATA = 0.5, 0.05, 0.1, 0.1, 0.3
 """Prior odds that any one cause acts, and most of a single one; that tolerances are too narrow; that the readings of a
@@ -74,7 +75,7 @@ class Entry:
     """A free number of an explanation.
 
     Attributes:
-        kind: number, start, cause, since, unknown, offset, gain, drift, delay.
+        kind: number, start, cause, change, since, unknown; of a sensor offset, step, gain, drift, delay.
         name: of the parameter, cause and number ("overflow.lip"), unknown input, or channel.
         record: which it belongs to; −1 if all share it.
         centre, sd: mean and standard deviation of its prior. [its unit]
@@ -209,15 +210,14 @@ def data_terms(model: Model) -> list[Term]:
             (f, sensor.turn * turns, words)
             for f, turns, words in (*KNOWN, *(KNOWN_ANGLES if sensor.angle else ()))
         ]
-        soft = [
-            ("offset", "has an offset"),
-            ("scale", "has an error of scale"),
-            ("affine", "has another scale and zero"),
-        ]
-        soft += [("drift", "drifts"), ("delay", "is late or early against the inputs")]
+        soft = [("offset", "has an offset"), ("scale", "has an error of scale"), ("drift", "drifts")]
+        if not sensor.logger:  # channels of one logger have one clock
+            soft.append(("delay", "is late or early against the inputs"))
         found += [
             Term(f"{kind}:{name}", f"{name} {words}", kind, name, odds / len(soft)) for kind, words in soft
         ]
+        both = odds / len(soft) * PRIOR_NEXT_DATA / len(soft)  # an offset, and then an error of scale
+        found.append(Term(f"affine:{name}", f"{name} has another scale and zero", "affine", name, both))
         found += [
             Term(
                 f"unit:{name}",
@@ -275,8 +275,8 @@ def entries_of(
     for term in terms:
         if term.kind == "cause":
             found += _of_cause(causes[term.target], term)
-        elif term.is_data_error:
-            found += _of_data_error(term, levels[term.target], intervals[term.target])
+    for name in levels:
+        found += _of_sensor(name, model, terms, levels[name], intervals[name])
     return found
 
 
@@ -309,13 +309,38 @@ def _of_cause(cause: Cause, term: Term) -> list[Entry]:
     return found
 
 
-def _of_data_error(term: Term, level: float, interval: float) -> list[Entry]:
-    offset = Entry("offset", term.target, 0.0, OFFSET_LEVELS * level)
-    gain = Entry("gain", term.target, 0.0, GAIN_SCALE, -1, -0.9, 9.0)
-    return {
-        "offset": [offset],
-        "scale": [gain],
-        "affine": [offset, gain],  # about the regression, which is in the term
-        "drift": [Entry("drift", term.target, 0.0, OFFSET_LEVELS * level)],
-        "delay": [Entry("delay", term.target, 0.0, DELAY_INTERVALS * interval)],
-    }.get(term.kind, [])
+OF_TERM: dict[str, tuple[str, ...]] = {
+    "offset": ("offset",),
+    "scale": ("gain",),
+    "affine": ("offset", "gain"),  # about the regression, which is in the term
+    "drift": ("drift",),
+    "delay": ("delay",),
+}
+"""Kind of a term → kinds of the numbers of a sensor that it frees; of an offset from a time on, "step"."""
+
+
+def kinds_of(term: Term) -> tuple[str, ...]:
+    """Return the kinds of the numbers that an error in the data frees."""
+    return ("step",) if term.kind == "offset" and math.isfinite(term.begins) else OF_TERM.get(term.kind, ())
+
+
+def _of_sensor(name: str, model: Model, terms: Terms, level: float, interval: float) -> list[Entry]:
+    """Return the numbers of a sensor that are not fixed: within their tolerances, or free."""
+    sensor = model.channels.get(name)
+    usual = {"offset": sensor.zero, "gain": sensor.scale, "delay": sensor.late} if sensor else {}
+    off = BEYOND * sensor.zero if sensor and sensor.zero else OFFSET_LEVELS * level
+    free = {kind for term in terms if term.is_data_error and term.target == name for kind in kinds_of(term)}
+    wide = {
+        "offset": off,
+        "step": off,
+        "drift": off,
+        "gain": GAIN_SCALE,
+        "delay": DELAY_INTERVALS * interval,
+    }
+    spreads = {kind: math.hypot(usual.get(kind, 0.0), wide[kind] * (kind in free)) for kind in wide}
+    bounds = {"gain": (-0.9, 9.0)}
+    return [
+        Entry(kind, name, 0.0, sd, -1, *bounds.get(kind, (-math.inf, math.inf)))
+        for kind, sd in spreads.items()
+        if sd > 0.0
+    ]

@@ -10,15 +10,15 @@ level binds them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize, minimize_scalar
 
 from subzero.identification.explanation import Entry, Terms
-from subzero.identification.noise import Filter, Noise
+from subzero.identification.noise import Filter, Noise, log_marginal
 from subzero.identification.problem import Problem
 
 SIZE_SPREAD = 1.0
@@ -27,10 +27,16 @@ ROUNDS, STEPS = 20, 3
 """Sensitivities are computed at most so often; Gauss-Newton steps with each."""
 PATIENCE = 2
 """Rounds without a gain that end a fit: the evidence of a linear problem falls now and then on the way."""
+SLOPE_ERROR = 0.02
+"""Sensitivities that miss no larger share of a change still hold. [-]"""
 TEMPER, APPROACHING = 0.3, 0.03
 """Noise on the way from afar, over the residual; a smaller share gained of every channel ends it. [-]"""
 ENOUGH = 0.05
 """A step that gains less log posterior ends them. [nats]"""
+TIMES_TRIED = (3.0, 10.0, 50.0)
+"""Correlation times that are tried first, in sampling intervals: a short and a long one are maxima of their own. [-]"""
+INVISIBLE = 1e-3
+"""A direction that moves all readings of a channel together by less, in levels of its sensor, is none. [-]"""
 SIZE_RANGE = (-5.0, 6.0)
 """Sizes of unknown inputs that are looked at, as logarithms of their ratio to the declared one. [-]"""
 
@@ -51,6 +57,16 @@ def usual_levels(problem: Problem) -> Levels:
         {name: each.prior.usual() for name, each in problem.channels.items()},
         {unknown.name: 1.0 for unknown in problem.model.unknown},
     )
+
+
+def quieter(problem: Problem, levels: Levels) -> Levels:
+    """Return levels with no more noise than usual."""
+    usual = usual_levels(problem).noise
+    noise = {
+        name: replace(each, white=min(each.white, usual[name].white), slow=min(each.slow, usual[name].slow))
+        for name, each in levels.noise.items()
+    }
+    return replace(levels, noise=noise)
 
 
 class Products:
@@ -110,27 +126,65 @@ def spreads(entries: Sequence[Entry], levels: Levels) -> np.ndarray:
 
 
 def solve(
-    products: tuple[np.ndarray, np.ndarray, float, float], sd: np.ndarray, off: np.ndarray
+    products: tuple[np.ndarray, np.ndarray, float, float],
+    entries: Sequence[Entry],
+    levels: Levels,
+    off: np.ndarray,
 ) -> tuple[np.ndarray, float, np.ndarray]:
-    """Return the step (n,) to the maximum of a linear problem's posterior, its log evidence, and the factor of
-    I + D^½ A D^½.
+    """Return the step (n,) to the maximum of a linear problem's posterior within bounds, its log evidence, and the
+    factor of H = I + D^½ A D^½.
 
     Args:
         products: of the point.
-        sd: √D (n,).
+        entries: its free numbers.
+        levels: sizes of unknown inputs.
         off: θ − c at the point (n,).
     """
     A, b, ee, log_scale = products
+    sd = spreads(entries, levels)
     # θ = c + √D z: e + J off is the residual with all numbers at the means of their priors.
     whole = b + A @ off
     square = ee + 2.0 * float(off @ b) + float(off @ A @ off)
     H = sd[:, None] * A * sd
     H.ravel()[:: sd.size + 1] += 1.0 + sd.size * np.finfo(float).eps * np.trace(H)
     factor = cho_factor(H, lower=True)
-    z = cho_solve(factor, sd * whole)
+    z = _within(H, sd * whole, cho_solve(factor, sd * whole), entries, sd)
     log_det = float(np.sum(np.log(np.diag(factor[0]))))
-    evidence = -0.5 * (square - float(z @ (sd * whole))) - log_det - log_scale
+    evidence = -0.5 * (square - 2.0 * float(z @ (sd * whole)) + float(z @ H @ z)) - log_det - log_scale
     return sd * z - off, evidence, factor
+
+
+def _within(
+    H: np.ndarray, g: np.ndarray, z: np.ndarray, entries: Sequence[Entry], sd: np.ndarray
+) -> np.ndarray:
+    """Return the minimum of ½ zᵀHz − gᵀz within bounds, from that without: what leaves them is held there, and the rest
+    follows.
+    """
+    centre = np.array([entry.centre for entry in entries])
+    low, high = ((bound - centre) / sd for bound in bounds(entries))
+    held = np.zeros(sd.size, dtype=bool)
+    while (outside := ~held & ((z < low) | (z > high))).any():
+        held |= outside
+        z = np.clip(z, low, high)
+        free = ~held
+        if free.any():
+            rest = g[free] - H[np.ix_(free, held)] @ z[held]
+            z[free] = np.linalg.solve(H[np.ix_(free, free)], rest)
+    return z
+
+
+def unexplained(problem: Problem, linear: Linear) -> float:
+    """Return what priors and noise do not explain of the residuals at a point: root mean square of e, whitened by
+    Σ + J D Jᵀ. 1 is expected.
+    """
+    products = Products(problem, linear.terms, linear.e, linear.J).total(linear.levels.noise)
+    sd = spreads(linear.entries, linear.levels)
+    step, *_ = solve(products, linear.entries, linear.levels, linear.off)
+    A, b, ee, _ = products
+    left = (
+        ee - 2.0 * float(step @ b) + float(step @ A @ step) + float(np.sum(((linear.off + step) / sd) ** 2))
+    )
+    return float(np.sqrt(left / sum(int(problem.used(name, linear.terms).sum()) for name in linear.e)))
 
 
 def log_levels(problem: Problem, levels: Levels) -> float:
@@ -170,7 +224,7 @@ class Linear:
     def evidence(self, problem: Problem) -> tuple[np.ndarray, float, np.ndarray]:
         """Return the best step (n,), the log evidence with everything that is not linear, and the factor."""
         products = Products(problem, self.terms, self.e, self.J).total(self.levels.noise)
-        step, evidence, factor = solve(products, spreads(self.entries, self.levels), self.off)
+        step, evidence, factor = solve(products, self.entries, self.levels, self.off)
         more = problem.log_jacobian(self.terms) + log_levels(problem, self.levels)
         return step, evidence + more, factor
 
@@ -180,50 +234,84 @@ def bounds(entries: Sequence[Entry]) -> tuple[np.ndarray, np.ndarray]:
     return np.array([entry.low for entry in entries]), np.array([entry.high for entry in entries])
 
 
-def fitted_levels(problem: Problem, linear: Linear) -> Levels:
-    """Return the noise and the sizes that have the highest evidence in a linear problem, one after the other, twice."""
+def fitted_levels(problem: Problem, linear: Linear, sweeps: int = 2) -> Levels:
+    """Return the noise and the sizes that have the highest evidence in a linear problem, one after the other."""
     products, levels = Products(problem, linear.terms, linear.e, linear.J), linear.levels
-    off = linear.off
-
-    def negative(levels: Levels) -> float:
-        prior = log_levels(problem, levels)
-        if not np.isfinite(prior):
-            return 1e300
-        return -solve(products.total(levels.noise), spreads(linear.entries, levels), off)[1] - prior
-
-    for _ in range(2):
+    for _ in range(sweeps):
         for unknown in problem.model.unknown:
-            levels = _best_size(levels, unknown.name, negative)
+            levels = _best_size(problem, linear, products, levels, unknown.name)
         for name in linear.e:
-            levels = _best_noise(levels, name, negative)
+            levels = _best_noise(problem, linear, products, levels, name)
     return levels
 
 
-def _best_size(levels: Levels, name: str, negative: Callable[[Levels], float]) -> Levels:
+def _best_size(problem: Problem, linear: Linear, products: Products, levels: Levels, name: str) -> Levels:
+    total, off = products.total(levels.noise), linear.off
+
     def at(log: float) -> Levels:
         return replace(levels, sizes={**levels.sizes, name: float(np.exp(log))})
 
-    found = minimize_scalar(
-        lambda log: negative(at(log)), bounds=SIZE_RANGE, method="bounded", options={"xatol": 0.05}
-    )
+    def negative(log: float) -> float:
+        there = at(log)
+        return -solve(total, linear.entries, there, off)[1] - log_levels(problem, there)
+
+    found = minimize_scalar(negative, bounds=SIZE_RANGE, method="bounded", options={"xatol": 0.05})
     return at(float(found.x))
 
 
-def _best_noise(levels: Levels, name: str, negative: Callable[[Levels], float]) -> Levels:
-    before = levels.noise[name]
+def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Levels, name: str) -> Levels:
+    """Return levels with the noise of a channel that has the highest evidence, given those of all others."""
+    before, prior = levels.noise[name], problem.channels[name].prior
+    times, columns = given_others(problem, linear, products, levels, name)
+    room = np.empty((columns.shape[1], columns.shape[1])), np.empty((2, columns.shape[1]))
 
-    def at(log: np.ndarray) -> Levels:
+    def at(log: np.ndarray) -> Noise:
         white, slow, time = (np.array([before.white, before.slow, before.time]) * np.exp(log)).tolist()
-        return replace(levels, noise={**levels.noise, name: Noise(white, slow, time)})
+        return Noise(white, slow, time)
 
-    start = np.vstack([np.zeros(3), np.diag([0.3, -0.5, 0.7])])
-    found = minimize(
-        lambda log: negative(at(log)),
-        np.zeros(3),
-        method="Nelder-Mead",
-        options={"initial_simplex": start, "maxfev": 60, "xatol": 0.02, "fatol": ENOUGH},
+    def negative(log: np.ndarray) -> float:
+        noise = at(log)
+        density = prior.log_density(noise)
+        if not np.isfinite(density):
+            return 1e300
+        given = Filter.of(noise, prior.resolution, times)
+        return -log_marginal(given.decay, given.gain, given.scale, columns, *room) - density
+
+    lasting = np.log(
+        np.array([before.time, *(share * prior.interval for share in TIMES_TRIED)]) / before.time
     )
-    return at(found.x) if found.fun <= negative(levels) else levels
+    begin = np.column_stack([np.zeros((lasting.size, 2)), lasting])
+    best = begin[int(np.argmin([negative(each) for each in begin]))]
+    simplex = best + np.vstack([np.zeros(3), np.diag([0.3, -0.5, 0.7])])
+    options = {"initial_simplex": simplex, "maxfev": 60, "xatol": 0.02, "fatol": ENOUGH}
+    found = minimize(negative, best, method="Nelder-Mead", options=options)
+    better = found.fun <= negative(np.zeros(3))
+    return replace(levels, noise={**levels.noise, name: at(found.x)}) if better else levels
+
+
+def given_others(
+    problem: Problem, linear: Linear, products: Products, levels: Levels, name: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the times of a channel's readings (m,), and [K e₀] (m, r + 1): given all other channels its residual is
+    e₀ − K w with w ~ N(0, I), whatever its own noise. Directions that move no reading visibly are left out.
+    """
+    others = {other: noise for other, noise in levels.noise.items() if other != name and other in linear.e}
+    sd, used = spreads(linear.entries, levels), problem.used(name, linear.terms)
+    J, e = linear.J[name][used], linear.e[name][used]
+    if others:
+        A, b, *_ = products.total(others)
+    else:
+        A, b = np.zeros((sd.size, sd.size)), np.zeros(sd.size)
+    H = sd[:, None] * A * sd + np.eye(sd.size)
+    factor = np.linalg.cholesky(H)
+    z = cho_solve((factor, True), sd * (b + A @ linear.off))
+    K = solve_triangular(factor, (J * sd).T, lower=True).T
+    U, s, _ = np.linalg.svd(K, full_matrices=False)
+    kept = s > INVISIBLE * problem.levels[name]
+    e0 = e + J @ (linear.off - sd * z)
+    return problem.channels[name].time[used], np.ascontiguousarray(
+        np.column_stack([U[:, kept] * s[kept], e0])
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,16 +355,14 @@ def fit(problem: Problem, terms: Terms, start: Mapping[Entry, float], levels: Le
         start: where it begins, of entries that are known there; others begin at the means of their priors.
         levels: noise and sizes at the beginning.
     """
-    entries = problem.entries(terms)
-    known = {entry.identity: value for entry, value in start.items()}
-    x = np.array([known.get(entry.identity, entry.centre) for entry in entries])
-    x = np.clip(x, *bounds(entries))
-    linear = _approached(problem, linearised(problem, terms, entries, x, levels))
+    entries, x = _beginning(problem, terms, start)
+    linear = origin = _approached(problem, linearised(problem, terms, entries, x, levels))
     best, score, lasting = linear, -np.inf, 0
     for _ in range(ROUNDS):
-        linear = replace(linear, levels=fitted_levels(problem, linear))
-        moved = _stepped(problem, linear)
-        linear = linearised(problem, terms, entries, moved.x, moved.levels)
+        moved = _stepped(problem, replace(linear, levels=fitted_levels(problem, linear)))
+        linear = moved
+        if not _is_linear(problem, origin, moved):
+            linear = origin = linearised(problem, terms, entries, moved.x, moved.levels)
         now = _laplace(problem, linear)[0]
         lasting = 0 if now > score + ENOUGH else lasting + 1
         if now > score:
@@ -284,6 +370,35 @@ def fit(problem: Problem, terms: Terms, start: Mapping[Entry, float], levels: Le
         if lasting == PATIENCE:
             break
     return _finished(problem, best)
+
+
+def can_begin(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> bool:
+    """Return whether the model can be simulated where a fit would begin."""
+    entries, x = _beginning(problem, terms, start)
+    return bool(problem.residuals(terms, entries, [x])[1][0])
+
+
+def _beginning(
+    problem: Problem, terms: Terms, start: Mapping[Entry, float]
+) -> tuple[list[Entry], np.ndarray]:
+    """Return the free numbers of an explanation, and where its fit begins (n,)."""
+    entries = problem.entries(terms)
+    known = {entry.identity: value for entry, value in start.items()}
+    x = np.array([known.get(entry.identity, entry.centre) for entry in entries])
+    return entries, np.clip(x, *bounds(entries))
+
+
+def _is_linear(problem: Problem, origin: Linear, there: Linear) -> bool:
+    """Return whether sensitivities of one point still hold at another: what they miss of the change of the residuals is
+    little, or a small share of it.
+    """
+    moved, missed = 0.0, 0.0
+    for name, e in there.e.items():
+        used, level = problem.used(name, there.terms), there.levels.noise[name].white
+        change = origin.J[name] @ (there.x - origin.x)
+        moved += float(np.sum((change[used] / level) ** 2))
+        missed += float(np.sum(((origin.e[name] - change - e)[used] / level) ** 2))
+    return missed < max(2.0 * ENOUGH, SLOPE_ERROR**2 * moved)
 
 
 def free_fit(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> Fit:
@@ -296,7 +411,7 @@ def free_fit(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> Fi
     entries = free.entries(terms)
     known = {entry.identity: value for entry, value in start.items() if entry.kind != "unknown"}
     x = np.clip(np.array([known.get(entry.identity, entry.centre) for entry in entries]), *bounds(entries))
-    linear = linearised(free, terms, entries, x, usual_levels(free))
+    linear = origin = linearised(free, terms, entries, x, usual_levels(free))
     for _ in range(ROUNDS):
         before = _left(free, linear)
         noise = {
@@ -304,7 +419,9 @@ def free_fit(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> Fi
             for name, each in linear.levels.noise.items()
         }
         there = _stepped(free, replace(linear, levels=Levels(noise, linear.levels.sizes)))
-        linear = linearised(free, terms, entries, there.x, linear.levels)
+        linear = replace(there, levels=linear.levels)
+        if not _is_linear(free, origin, there):
+            linear = origin = linearised(free, terms, entries, there.x, linear.levels)
         now = _left(free, linear)
         if all(now[name] > (1.0 - APPROACHING) * before[name] for name in before):
             break
@@ -397,7 +514,7 @@ def _laplace(problem: Problem, linear: Linear) -> tuple[float, np.ndarray]:
     """Return the log evidence of Laplace at a point that is a maximum, and the posterior variances (n,)."""
     products = Products(problem, linear.terms, linear.e, linear.J).total(linear.levels.noise)
     sd = spreads(linear.entries, linear.levels)
-    factor = solve(products, sd, linear.off)[2]
+    factor = solve(products, linear.entries, linear.levels, linear.off)[2]
     log_det = float(np.sum(np.log(np.diag(factor[0]))))
     evidence = (
         -_negative_log_posterior(problem, linear) - log_det - products[3] + log_levels(problem, linear.levels)

@@ -1,8 +1,8 @@
 """Locks on a name, besides its probability: the prediction of what was not fitted.
 
 Of records that were held out the prediction must surely improve. Where the record itself is divided, it must not surely
-get worse: other parameters may bend so far that a short last part looks the same. (Wider tolerances are a term of the
-search: what they explain as well is undecided there.)
+get worse by the noise of the sensors: other parameters may bend so far that a short last part looks the same. (Wider
+tolerances are a term of the search: what they explain as well is undecided there.)
 
     gain = Σ (e/ν)² without the term − Σ (e/ν)² with it     in free simulation of readings that were not fitted
 
@@ -48,8 +48,8 @@ class Gain:
 
     @property
     def holds(self) -> bool:
-        """Whether the prediction improves: surely, if records were held out; else not surely for the worse."""
-        return (self.low if self.strict else self.high) > 0.0
+        """Whether the prediction improves: surely, if records were held out; else is not surely worse by a level."""
+        return self.low > 0.0 if self.strict else self.high > -1.0
 
 
 @dataclass(frozen=True)

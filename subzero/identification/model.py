@@ -111,8 +111,10 @@ class Sensor:
         angle: whether whole turns make no difference.
         resolution: what it rounds to; None if it is to be read off the record. [unit]
         low, high: where it saturates. [unit]
+        zero, scale, late: standard deviations of the usual error of its zero [unit], its scale [-] and its clock [s],
+            which is part of every explanation.
         trusted: no error in its data is considered.
-        logger: channels of one logger share their errors of units and clocks.
+        logger: channels of one logger share their errors of units, and have one clock.
     """
 
     noise: float | None = None
@@ -122,6 +124,9 @@ class Sensor:
     resolution: float | None = None
     low: float = -math.inf
     high: float = math.inf
+    zero: float = 0.0
+    scale: float = 0.0
+    late: float = 0.0
     trusted: bool = False
     logger: str = ""
 
@@ -129,8 +134,10 @@ class Sensor:
         if self.noise is not None:
             positive("the noise of a sensor", self.noise)
         positive("the spread of the noise of a sensor", self.spread)
-        if self.resolution is not None and finite("the resolution of a sensor", self.resolution) < 0.0:
-            raise ModelError(f"the resolution of a sensor is {self.resolution!r}; it must not be negative.")
+        for what in ("resolution", "zero", "scale", "late"):
+            value = getattr(self, what)
+            if value is not None and finite(f"{what} of a sensor", value) < 0.0:
+                raise ModelError(f"{what} of a sensor is {value!r}; it must not be negative.")
         if not self.low < self.high:
             raise ModelError(f"a sensor saturates at {self.low:g} and {self.high:g}: the first must be less.")
 

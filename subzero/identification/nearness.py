@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from subzero.identification.explanation import kinds_of
 from subzero.identification.fit import Fit
 from subzero.identification.problem import Problem
 
@@ -124,18 +125,26 @@ def rms(values: np.ndarray) -> float:
 
 def _bends(problem: Problem, fitted: Fit) -> dict[str, float]:
     """Return how far parameters that no term names are from their nominal values, in tolerances."""
-    tolerance = {number.name: number.tolerance for number in problem.model.shared}
+    tolerance = {("number", number.name): number.tolerance for number in problem.model.shared}
+    for name, sensor in problem.model.channels.items():
+        tolerance |= {
+            ("offset", name): sensor.zero,
+            ("gain", name): sensor.scale,
+            ("delay", name): sensor.late,
+        }
     named = {
-        name
+        ("number", name)
         for cause in problem.model.causes
         for name in cause.changes
         if cause.id in {t.target for t in fitted.terms}
     }
+    named |= {(kind, term.target) for term in fitted.terms for kind in kinds_of(term)}
     calibrated = any(term.kind == "tolerances" for term in fitted.terms)
     found = {
-        entry.name: abs(value - entry.centre)
-        / (entry.sd if calibrated or entry.name in problem.model.tuned_on else tolerance[entry.name])
+        entry.name if entry.kind == "number" else f"{entry.kind} of {entry.name}": abs(value - entry.centre)
+        / (entry.sd if calibrated or entry.name in problem.model.tuned_on else tolerance[key])
         for entry, value in zip(fitted.entries, fitted.x.tolist(), strict=True)
-        if entry.kind == "number" and entry.name not in named
+        for key in [(entry.kind, entry.name)]
+        if tolerance.get(key, 0.0) > 0.0 and key not in named
     }
     return dict(sorted(found.items(), key=lambda pair: -pair[1]))

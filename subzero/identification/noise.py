@@ -2,6 +2,8 @@
 
     Σ_ij = (σ_w² + q²/12) δ_ij + σ_s² exp(−|t_i − t_j|/τ_s)
 
+Of equal readings in a row the middle one is used: what rounds or holds a value errs by the same in all of them.
+
 Σ is never formed: a Kalman filter with the slow part as its state turns a residual into its innovations, which are
 white (Rasmussen & Williams 2006, app. B; Hartikainen & Särkkä 2010).
 """
@@ -20,6 +22,8 @@ BINDING = 5.0
 """A level binds: σ_w is no farther from it, in standard deviations of its logarithm. [-]"""
 SLOW_SHARE, SLOW_SPREAD = 0.3, 0.7
 """Usual slow part of a sensor, over its level, and the standard deviation of its logarithm. [-]"""
+SLOWEST_WHITE = 2.0
+"""A part whose τ_s is less, in sampling intervals, is white. [-]"""
 TIME_SPREAD = 1.0
 """Standard deviation of log τ_s about ten sampling intervals. [-]"""
 FLOOR_SHARE = 1e-6
@@ -62,7 +66,8 @@ class NoisePrior:
 
     def log_density(self, noise: Noise) -> float:
         """Return the log prior density of a noise, up to a constant."""
-        if noise.slow > self.most or abs(np.log(noise.white / self.level)) > BINDING * self.spread:
+        binds = noise.slow > self.most or abs(np.log(noise.white / self.level)) > BINDING * self.spread
+        if binds or noise.time < SLOWEST_WHITE * self.interval:
             return -np.inf
         off = (
             np.log(noise.white / self.level) / self.spread,
@@ -80,6 +85,14 @@ def resolution_of(values: np.ndarray) -> float:
     step = float(np.min(np.diff(distinct)))
     ratio = (distinct - distinct[0]) / step
     return step if np.max(np.abs(ratio - np.rint(ratio))) < 0.05 else 0.0
+
+
+def middle_of_equal(values: np.ndarray) -> np.ndarray:
+    """Return which of some readings (m,) are the middle of equal ones in a row, or differ from both neighbours."""
+    begins = np.flatnonzero(np.diff(values, prepend=np.nan) != 0.0)
+    found = np.zeros(values.size, dtype=bool)
+    found[(begins + np.append(begins[1:], values.size)) // 2] = True
+    return found
 
 
 def level_of(values: np.ndarray, resolution: float) -> float:
@@ -147,3 +160,46 @@ def innovations(
             new = values[i, j] - expected
             white[i, j] = new / scale[i]
             expected = decay[i] * (expected + gain[i] * new)
+
+
+@compiled
+def log_marginal(
+    decay: np.ndarray,
+    gain: np.ndarray,
+    scale: np.ndarray,
+    columns: np.ndarray,
+    G: np.ndarray,
+    row: np.ndarray,
+) -> float:
+    """Return the log density of residuals e₀ − K w with w ~ N(0, I), up to a constant, from columns [K e₀] (m, r + 1).
+
+    log p = −½ (e₀ᵀΣ⁻¹e₀ − bᵀH⁻¹b) − ½ log|H| − ½ log|Σ|,   H = I + KᵀΣ⁻¹K,   b = KᵀΣ⁻¹e₀
+
+    G (r + 1, r + 1) and row (2, r + 1) are overwritten.
+    """
+    count, total = columns.shape[1], 0.0
+    expected, white = row[0], row[1]
+    for j in range(count):
+        expected[j] = 0.0
+        for k in range(count):
+            G[j, k] = 1.0 if j == k and j < count - 1 else 0.0
+    for i in range(columns.shape[0]):
+        for j in range(count):
+            new = columns[i, j] - expected[j]
+            white[j] = new / scale[i]
+            expected[j] = decay[i] * (expected[j] + gain[i] * new)
+        for j in range(count):
+            for k in range(j + 1):
+                G[j, k] += white[j] * white[k]
+        total -= np.log(scale[i])
+    # The last row of the Cholesky factor of [H b; bᵀ e₀ᵀΣ⁻¹e₀] leaves the square that w does not explain.
+    for j in range(count):
+        for k in range(j):
+            for i in range(k):
+                G[j, k] -= G[j, i] * G[k, i]
+            G[j, k] /= G[k, k]
+            G[j, j] -= G[j, k] * G[j, k]
+        if j < count - 1:
+            G[j, j] = np.sqrt(G[j, j])
+            total -= np.log(G[j, j])
+    return total - 0.5 * G[-1, -1]

@@ -13,7 +13,7 @@ import numpy as np
 from subzero.errors import UserError
 from subzero.identification.explanation import CLOCK, Entry, Term, Terms, entries_of
 from subzero.identification.model import Model
-from subzero.identification.noise import OPEN_SPREAD, NoisePrior, level_of, resolution_of
+from subzero.identification.noise import OPEN_SPREAD, NoisePrior, level_of, middle_of_equal, resolution_of
 from subzero.identification.record import Record
 from subzero.identification.simulation import Asked, Runs
 
@@ -21,13 +21,13 @@ STEP = 0.1
 """Step of a sensitivity, over the standard deviation of a number's prior. [-]"""
 FEWEST_SAMPLES = 8
 """A channel with fewer readings in all records is not used."""
-SPIKE = 8.0
-"""A reading so many levels off the median of its neighbours, which agree with one another, is set aside. [-]"""
+SPIKE = 5.0
+"""A reading so many levels off the middle of those next to it, which agree with one another, is set aside. [-]"""
 MAX_KNOTS = 200
 """Most knots of one unknown input in one record: its time is lengthened where there would be more."""
 FIXED = 1e-6
 """Prior standard deviation of a number that is fixed, over its own. [-]"""
-CORRECTIONS = ("offset", "gain", "drift", "delay")
+CORRECTIONS = ("offset", "step", "gain", "drift", "delay")
 """Entries that change the record, not the simulation."""
 
 Progress = Callable[[float, str], None]
@@ -42,13 +42,15 @@ class Readings:
         time: of each (m,). [s]
         values: as recorded (m,).
         record: which each belongs to (m,).
-        used: which are finite, and no spikes (m,).
+        spikes: which are alone far from their neighbours, or outside the record's time (m,).
+        used: which are finite, no spikes, and the middle of equal ones in a row (m,).
         prior: of the sensor.
     """
 
     time: np.ndarray
     values: np.ndarray
     record: np.ndarray
+    spikes: np.ndarray
     used: np.ndarray
     prior: NoisePrior
 
@@ -123,8 +125,25 @@ class Problem:
         steps = np.diff(time)
         spread = OPEN_SPREAD if sensor.noise is None else sensor.spread
         prior = NoisePrior(level, step, float(np.median(steps[steps > 0.0])), spread)
-        used = finite & ~_spikes(values, SPIKE * max(level, step), sensor.turn)
-        return Readings(time, values, of, used, prior)
+        far = SPIKE * float(np.hypot(level, step / np.sqrt(12.0)))
+        away = self._wrapped(name, values - self._at_nominal(name, having))
+        aside = np.isfinite(values) & (~inside | spikes(values, far, sensor.turn) | spikes_at_ends(away, far))
+        used = finite & ~aside
+        for k, _ in having:
+            at = np.flatnonzero(used & (of == k))
+            used[at] = middle_of_equal(values[at])
+        return Readings(time, values, of, aside, used, prior)
+
+    def _at_nominal(self, name: str, having: Sequence[tuple[int, Record]]) -> np.ndarray:
+        """Return what the nominal model shows of a channel at its times in some records (m,); NaN where it fails."""
+        found = []
+        for k, record in having:
+            unknown = {each.name: np.zeros(record.time.size) for each in self.model.unknown}
+            (readings,) = self.runs[k].readings([Asked(self._nominal, unknown)])
+            times = record.times_of(name)
+            shown = np.interp(times, record.time, readings[name]) if readings else np.full(times.size, np.nan)
+            found.append(shown)
+        return np.concatenate(found)
 
     @cached_property
     def levels(self) -> dict[str, float]:
@@ -248,20 +267,20 @@ class Problem:
     def shown(
         self, name: str, terms: Terms, entries: Sequence[Entry], x: np.ndarray, simulated: np.ndarray
     ) -> np.ndarray:
-        """Return what a sensor with free errors shows of simulated readings h: a + (1 + g) h + d τ (m,)."""
+        """Return what a sensor with its errors shows of simulated readings h: a + (1 + g) h + d τ + step (m,)."""
         each = self.channels[name]
         free = {
             entry.kind: x[i]
             for i, entry in enumerate(entries)
             if entry.name == name and entry.kind in CORRECTIONS
         }
-        values = simulated.copy()
+        values = free.get("offset", 0.0) + (1.0 + free.get("gain", 0.0)) * simulated
         for term in self._errors(name, terms):
             at = self._where(each, term)
             if term.kind == "drift":
                 values[at] += free["drift"] * self._ramp(each)[at]
-            elif term.slot[0] == "y = a + b x":
-                values[at] = free.get("offset", 0.0) + (1.0 + free.get("gain", 0.0)) * values[at]
+            elif term.kind == "offset" and "step" in free:
+                values[at] += free["step"]
         return values
 
     def _errors(self, name: str, terms: Terms) -> list[Term]:
@@ -374,14 +393,45 @@ def _input(record: Record, name: str) -> np.ndarray:
     return np.interp(record.time, at[known], values[known])
 
 
-def _spikes(values: np.ndarray, far: float, turn: float) -> np.ndarray:
-    """Return which readings (m,) are alone far from both neighbours, which agree."""
-    found = np.zeros(values.size, dtype=bool)
-    before, after = values[1:-1] - values[:-2], values[1:-1] - values[2:]
+def spikes(values: np.ndarray, far: float, turn: float) -> np.ndarray:
+    """Return which readings (m,) are alone far from a line, and from a cubic, through those next to them, where these
+    agree: a curve that is sampled coarsely has no spikes, and neither has what stands beside one. Of two side by side
+    each is twice as far from six neighbours, most of which agree.
+    """
+    found, at = np.zeros(values.size, dtype=bool), np.flatnonzero(np.isfinite(values))
+    if at.size < 5:
+        return found
+    at, each = at[2:-2], at[np.arange(at.size - 4)[:, None] + [0, 1, 3, 4]]
+    away = values[each] - values[at][:, None]
     if turn:
-        before, after = before - turn * np.rint(before / turn), after - turn * np.rint(after / turn)
-    with np.errstate(invalid="ignore"):
-        apart = np.abs(before - after)
-        found[1:-1] = (np.minimum(np.abs(before), np.abs(after)) > far) & (before * after > 0.0)
-        found[1:-1] &= apart < 0.5 * np.minimum(np.abs(before), np.abs(after))
+        away -= turn * np.rint(away / turn)
+    line, cubic = away @ [0.0, 0.5, 0.5, 0.0], away @ [-1.0 / 6.0, 4.0 / 6.0, 4.0 / 6.0, -1.0 / 6.0]
+    off = np.minimum(np.abs(line), np.abs(cubic))
+    apart = np.maximum(2.0 * np.abs(line - cubic), np.abs(away[:, 1] - away[:, 2]))
+    found[at] = (off > far) & (apart < off)
+    return found | _pairs(values, 2.0 * far, turn)
+
+
+def _pairs(values: np.ndarray, far: float, turn: float) -> np.ndarray:
+    """Return which readings (m,) are far from the median of the six next to them, the middle four of which agree."""
+    found, at = np.zeros(values.size, dtype=bool), np.flatnonzero(np.isfinite(values))
+    if at.size < 7:
+        return found
+    each, at = at[np.arange(at.size - 6)[:, None] + [0, 1, 2, 4, 5, 6]], at[3:-3]
+    away = values[each] - values[at][:, None]
+    if turn:
+        away -= turn * np.rint(away / turn)
+    ordered = np.sort(away, axis=1)
+    off = np.abs(np.median(ordered, axis=1))
+    found[at] = (off > far) & (ordered[:, 4] - ordered[:, 1] < 0.25 * off)
+    return found
+
+
+def spikes_at_ends(away: np.ndarray, far: float) -> np.ndarray:
+    """Return which of the first and last two of residuals (m,) are far from the four next to them, which agree."""
+    found, at = np.zeros(away.size, dtype=bool), np.flatnonzero(np.isfinite(away))
+    for ends in (at, at[::-1]) if at.size > 5 else ():
+        beside = away[ends[2:6]]
+        off = np.abs(away[ends[:2]] - np.median(beside))
+        found[ends[:2]] |= (off > far) & (np.ptp(beside) < 0.5 * off)
     return found

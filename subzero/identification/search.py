@@ -11,9 +11,19 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from subzero.identification.candidates import declared, suggested
+from subzero.identification.candidates import OFF_LEVELS, declared, suggested
 from subzero.identification.explanation import Entry, Term, Terms, log_prior, with_term, without
-from subzero.identification.fit import Fit, Linear, fit, fitted_levels, linearised, usual_levels
+from subzero.identification.fit import (
+    Fit,
+    Linear,
+    can_begin,
+    fit,
+    fitted_levels,
+    linearised,
+    quieter,
+    unexplained,
+    usual_levels,
+)
 from subzero.identification.problem import Problem, Progress
 
 MOST_TERMS = 8
@@ -22,8 +32,10 @@ RANKED_AGAIN, FITTED = 10, 6
 """So many of the best are ranked again with their own noise; at most so many of these are fitted."""
 WITHIN = 5.0
 """Explanations within this of the best are expanded, too. [nats]"""
-WORTH = 1.0
-"""A term that is ranked to gain less is not fitted. [nats]"""
+WORTH, STEP_WORTH = 3.0, 1.0
+"""A term that is ranked to lose more is not fitted; one that gains less ends the way from the nominal model. [nats]"""
+OF_MODEL = ("number", "start", "unknown")
+"""Kinds of entries that every explanation has."""
 TWINS = ("offset", "scale", "affine", "delay")
 """Errors that another channel of the unit may have in the place of the first one."""
 MOST_FITS = 60
@@ -59,6 +71,7 @@ class Search:
     def __post_init__(self) -> None:
         self._expanded: set[Key] = set()
         self._tried: set[Key] = set()
+        self._added: dict[int, tuple[Linear, list[tuple[float, Linear]]]] = {}
         self._terms = declared(self.problem)
         self._loggers = {name: sensor.logger for name, sensor in self.problem.model.channels.items()}
 
@@ -77,7 +90,7 @@ class Search:
         nominal = linearised(
             problem, (), entries, np.array([entry.centre for entry in entries]), levels, must=True
         )
-        chain = self._greedy(nominal)
+        chain = self._greedy(nominal) if unexplained(problem, nominal) > OFF_LEVELS else []
         self._fit((), nominal)
         for linear in chain:
             self._fit(linear.terms, linear)
@@ -104,11 +117,11 @@ class Search:
         """Fit the best explanations that are one move away."""
         self._expanded.add(key(base.terms))
         for linear in self._best_additions(base.linear):
-            self._fit(linear.terms, linear)
+            self._fit(linear.terms, linear, self._linear_score(linear))
         for term in base.terms:
             smaller = self._fit(without(base.terms, term), base.linear)
             for linear in self._best_additions(smaller.linear):
-                self._fit(linear.terms, linear)
+                self._fit(linear.terms, linear, self._linear_score(linear))
             for twin in self._twins(term):
                 self._fit(with_term(smaller.terms, twin), base.linear)
 
@@ -130,8 +143,10 @@ class Search:
                     size=-term.size,
                 )
 
-    def _fit(self, terms: Terms, start: Linear) -> Fit:
-        """Return the fit of an explanation; it is fitted from each start only once."""
+    def _fit(self, terms: Terms, start: Linear, promised: float = -np.inf) -> Fit:
+        """Return the fit of an explanation from a start; also from the nominal model, if it is much less probable than
+        the linear problem promised: the way there may be barred by what another explanation bent.
+        """
         name = key(terms)
         if name in self._tried:
             return self.fits[name]
@@ -140,6 +155,11 @@ class Search:
         self.progress(min(0.9, 0.05 + 0.02 * len(self.fits)), f"fit of {words}")
         values: dict[Entry, float] = dict(zip(start.entries, start.x.tolist(), strict=True))
         fitted = fit(self.problem, terms, values, start.levels)
+        if self.score(fitted) < promised - WORTH:
+            own = {entry: value for entry, value in values.items() if entry.kind not in OF_MODEL}
+            if can_begin(self.problem, terms, own):
+                again = fit(self.problem, terms, own, usual_levels(self.problem))
+                fitted = max(fitted, again, key=self.score)
         if name not in self.fits or fitted.log_evidence > self.fits[name].log_evidence:
             self.fits[name] = fitted
         return self.fits[name]
@@ -150,7 +170,7 @@ class Search:
         here, before = nominal, self._linear_score(nominal)
         while len(here.terms) < MOST_TERMS:
             added = self._additions(here)
-            if not added or added[0][0] < before + WORTH:
+            if not added or added[0][0] < before + STEP_WORTH:
                 break
             before, here = added[0]
             chain.append(here)
@@ -165,12 +185,27 @@ class Search:
             return []
         here = self._linear_score(base)
         again = []
-        for _, linear in self._distinct(self._additions(base))[:RANKED_AGAIN]:
-            own = replace(linear, levels=fitted_levels(self.problem, linear))
+        for linear in self._worth_own_noise(self._additions(base)):
+            own = replace(linear, levels=fitted_levels(self.problem, linear, sweeps=1))
             again.append((self._linear_score(own), own))
         again.sort(key=lambda pair: -pair[0])
         least = max(here - WORTH, again[0][0] - WITHIN) if again else here
         return [linear for score, linear in again[:FITTED] if score > least]
+
+    def _worth_own_noise(self, ranked: list[tuple[float, Linear]]) -> Iterator[Linear]:
+        """Yield the best, ranked with the noise of the explanation that they are added to, and with usual noise: what a
+        term would explain may be part of the former.
+        """
+        quiet = [
+            (self._linear_score(replace(each, levels=quieter(self.problem, each.levels))), each)
+            for _, each in ranked
+        ]
+        quiet.sort(key=lambda pair: -pair[0])
+        found: dict[Key, Linear] = {}
+        for order in (ranked, quiet):
+            for _, linear in self._distinct(order)[:RANKED_AGAIN]:
+                found.setdefault(key(linear.terms), linear)
+        yield from found.values()
 
     def _distinct(self, ranked: Iterable[tuple[float, Linear]]) -> list[tuple[float, Linear]]:
         found: dict[Key, tuple[float, Linear]] = {}
@@ -180,10 +215,14 @@ class Search:
 
     def _additions(self, base: Linear) -> list[tuple[float, Linear]]:
         """Return explanations with one term more, linearised, with their scores: the best first."""
+        if id(base) in self._added:
+            return self._added[id(base)][1]
         present = {term.id for term in base.terms}
         worth = [term for term in suggested(self.problem, base, self._terms) if term.id not in present]
         found = [(self._linear_score(linear), linear) for term in worth for linear in self.added(base, term)]
-        return sorted(found, key=lambda pair: -pair[0])
+        found.sort(key=lambda pair: -pair[0])
+        self._added[id(base)] = (base, found)  # kept with its base, so that no other can take its identity
+        return found
 
     def added(self, base: Linear, term: Term) -> Iterator[Linear]:
         """Yield an explanation with a term more, if it can be simulated where the term begins."""

@@ -9,9 +9,17 @@ import pytest
 from scipy.stats import multivariate_normal
 
 import subzero.diagnosis as sd
-from subzero.identification.fit import Levels, linearised
-from subzero.identification.noise import Filter, Noise, NoisePrior, level_of, resolution_of
-from subzero.identification.problem import Problem
+from subzero.identification.fit import Levels, Products, fit, given_others, linearised, solve
+from subzero.identification.noise import (
+    Filter,
+    Noise,
+    NoisePrior,
+    level_of,
+    log_marginal,
+    middle_of_equal,
+    resolution_of,
+)
+from subzero.identification.problem import Problem, spikes, spikes_at_ends
 
 
 def line(p, u, t):
@@ -120,3 +128,129 @@ def test_a_declared_level_binds():
     prior = NoisePrior(level=0.1, resolution=0.0, interval=0.1, spread=0.1)
     assert prior.log_density(Noise(0.3, 0.03, 1.0)) == -np.inf
     assert prior.log_density(Noise(0.11, 0.03, 1.0)) > -2.0
+
+
+def test_the_density_of_a_channel_given_the_others_is_that_of_a_gaussian():
+    rng = np.random.default_rng(5)
+    time, noise = np.cumsum(rng.uniform(0.05, 0.4, 50)), Noise(0.3, 0.7, 1.5)
+    K, e = rng.standard_normal((50, 4)), rng.standard_normal(50)
+    given = Filter.of(noise, 0.0, time)
+    found = log_marginal(
+        given.decay, given.gain, given.scale, np.column_stack([K, e]), np.empty((5, 5)), np.empty((2, 5))
+    )
+    exact = multivariate_normal.logpdf(e, np.zeros(50), covariance(noise, time) + K @ K.T)
+    assert found - 25.0 * np.log(2.0 * np.pi) == pytest.approx(exact, abs=1e-8)
+
+
+def test_a_channel_given_the_others_changes_the_evidence_as_all_channels_together_do():
+    rng = np.random.default_rng(4)
+    time = np.linspace(0.0, 10.0, 40)
+    columns = {name: 0.8 + 0.6 * time + 0.1 * rng.standard_normal(40) for name in ("y", "z")}
+    numbers = [sd.Number("a", 0.8, tolerance=0.3), sd.Number("b", 0.6, tolerance=0.2)]
+    sensor = sd.Sensor(noise=0.1, resolution=0.0)
+
+    def both(p, u, t):
+        return dict.fromkeys(("y", "z"), p["a"] + p["b"] * t)
+
+    problem = Problem(
+        sd.Model(both, {"y": sensor, "z": sensor}, parameters=numbers), [sd.Record(time, columns)]
+    )
+    entries = problem.entries(())
+    first, second = Noise(0.1, 0.05, 0.7), Noise(0.2, 0.01, 2.0)
+    linear = linearised(problem, (), entries, np.array([0.9, 0.5]), Levels({"y": first, "z": first}, {}))
+    products = Products(problem, (), linear.e, linear.J)
+    samples, columns_given = given_others(problem, linear, products, linear.levels, "y")
+    count = columns_given.shape[1]
+
+    def alone(noise):
+        filtered = Filter.of(noise, 0.0, samples)
+        return log_marginal(
+            filtered.decay,
+            filtered.gain,
+            filtered.scale,
+            columns_given,
+            np.empty((count, count)),
+            np.empty((2, count)),
+        )
+
+    def together(noise):
+        total = products.total({"y": noise, "z": first})
+        return solve(total, entries, linear.levels, linear.off)[1]
+
+    assert alone(second) - alone(first) == pytest.approx(together(second) - together(first), abs=1e-6)
+
+
+def test_what_a_bound_forbids_is_left_at_the_bound_and_the_rest_follows(problem):
+    numbers = [sd.Number("a", 0.8, tolerance=0.3), sd.Number("b", 0.6, tolerance=0.2, low=0.55)]
+    model = sd.Model(line, problem.model.channels, parameters=numbers, unknown=problem.model.unknown)
+    bound = Problem(model, problem.records)
+    held = Problem(model, problem.records, {("number", "b", -1, 0): 0.55})
+    levels = Levels({"y": Noise(0.1, 0.05, 0.7)}, {"push": 1.0})
+    found, expected = (
+        linearised(each, (), each.entries(()), np.array([e.centre for e in each.entries(())]), levels)
+        for each in (bound, held)
+    )
+    there = found.x + found.evidence(bound)[0]
+    assert there[1] == pytest.approx(0.55)
+    np.testing.assert_allclose(there, expected.x + expected.evidence(held)[0], atol=1e-5)
+
+
+def test_equal_readings_in_a_row_say_no_more_than_one(problem):
+    """A sensor that holds its values for five samples gives a mean of the same uncertainty as the values themselves."""
+    rng = np.random.default_rng(2)
+    fresh = 0.8 + 0.1 * rng.standard_normal(40)
+    held = np.repeat(fresh, 5)
+    assert np.flatnonzero(middle_of_equal(held)).tolist() == list(range(2, 200, 5))
+    number = [sd.Number("a", 0.0, tolerance=10.0)]
+    found = []
+    for values in (fresh, held):
+        model = sd.Model(
+            lambda p, u, t: {"y": p["a"] + 0.0 * t}, {"y": sd.Sensor(noise=0.1)}, parameters=number
+        )
+        record = sd.Record(np.arange(float(values.size)), {"y": values})
+        whole = Problem(model, [record])
+        # A slow part of nothing: with the usual one a longer record knows more of it.
+        quiet = Levels({"y": Noise(0.1, 1e-6, 10.0)}, {})
+        linear = linearised(whole, (), whole.entries(()), np.array([0.8]), quiet)
+        _, _, (factor, _) = linear.evidence(whole)
+        found.append((linear.x[0] + linear.evidence(whole)[0][0], 10.0 / factor[0, 0]))
+    np.testing.assert_allclose(found[0], found[1], rtol=1e-6)
+    assert found[0][1] == pytest.approx(0.1 / np.sqrt(40.0), rel=1e-3)
+
+
+def test_a_spike_is_set_aside_beside_a_gap_and_a_corner_is_not():
+    values = np.array([0.0, 0.1, np.nan, 5.0, 0.0, 0.1, 0.0, 1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0])
+    assert np.flatnonzero(spikes(values, 0.5, 0.0)).tolist() == [3]
+    heading = np.array([358.0, 359.0, 0.0, 1.0, 90.0, 2.0, 3.0])
+    assert np.flatnonzero(spikes(heading, 5.0, 360.0)).tolist() == [4]
+    pair = np.array([0.0, 0.1, 0.0, 5.0, 5.1, 0.0, 0.1, 0.0, 0.1])
+    assert np.flatnonzero(spikes(pair, 0.5, 0.0)).tolist() == [3, 4]
+    away = np.array([0.1, 4.0, 0.0, 0.1, -0.1, 0.1, 0.0, -4.0])
+    assert np.flatnonzero(spikes_at_ends(away, 0.5)).tolist() == [1, 7]
+
+
+def test_the_usual_errors_of_a_sensor_are_part_of_every_explanation():
+    """A gauge that is known to ± 0.5 m and errs by 0.6 m has no error; one that is known to ± 0.05 m has."""
+    time = np.arange(0.0, 60.0, 1.0)
+    seen = 0.6 + 5.0 + 2.0 * np.sin(0.3 * time) + 0.02 * np.random.default_rng(0).standard_normal(time.size)
+    record = sd.Record(time, {"depth": seen})
+    for zero, verdict in ((0.5, "nothing_wrong"), (0.05, "data_error")):
+        model = sd.Model(
+            lambda p, u, t: {"depth": 5.0 + p["amplitude"] * np.sin(0.3 * t)},
+            {"depth": sd.Sensor(noise=0.02, zero=zero, unit="m")},
+            parameters=[sd.Number("amplitude", 2.0, tolerance=0.02)],
+        )
+        found = sd.diagnose(record, model)
+        assert found.verdict == verdict, found
+    assert found.named[0].id == "offset:depth"
+    assert found.named[0].estimates[0].value == pytest.approx(0.6, abs=0.05)
+
+
+def test_a_fit_begins_where_it_is_told_and_ends_at_the_maximum(problem):
+    """Of a linear problem the maximum is the same from everywhere, to the gain that ends a fit: 0.05 nats."""
+    levels = Levels({"y": Noise(0.1, 0.03, 2.0)}, {"push": 1.0})
+    ends = [
+        fit(problem, (), {entry: at * entry.sd for entry in problem.entries(())}, levels).log_evidence
+        for at in (0.0, 3.0)
+    ]
+    assert abs(ends[0] - ends[1]) < 0.1
