@@ -36,6 +36,7 @@ from cable.hold import HoldError, hold
 from cable.properties import CableProperties
 from cable.pull_out import SCHEMES, pull_out, tow
 from cable.schemes import Equation7, Lumped, MovingEnd, Paper
+from cable.sea_bed import SeaBed
 from cable.task import MovingDrum
 from cable.tether import Tether, TetherError, TetherState
 from cable.winch import Brake, ConstantTension, PayOutRate
@@ -57,6 +58,7 @@ __all__ = [
     "Outcome",
     "Paper",
     "PayOutRate",
+    "SeaBed",
     "Tether",
     "TetherError",
     "TetherState",

@@ -14,6 +14,7 @@ import numpy as np
 from cable.current import Current
 from cable.doubts import SLACK_SHARE, above_surface, doubts_of
 from cable.properties import CableProperties
+from cable.sea_bed import SeaBed
 from subzero.errors import BadValueError, real, short
 from subzero.files.text_repr import Overview
 
@@ -235,6 +236,8 @@ class Equilibrium:
         segment_lengths: unstretched (nodes − 1,). [m]
         segment_tensions: in the segments (nodes − 1,). [N]
         steps: how many steps the search took; 2 or 3 where Newton's method came through at once.
+        bed: the sea bed; None without.
+        bed_friction: of the bed on the nodes, as a share of its pressure, north, east, down (nodes, 3); empty without.
     """
 
     cable: CableProperties
@@ -247,6 +250,8 @@ class Equilibrium:
     segment_lengths: np.ndarray
     segment_tensions: np.ndarray
     steps: int
+    bed: SeaBed | None = None
+    bed_friction: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def slack_length(self) -> float:

@@ -38,6 +38,7 @@ import numpy as np
 from cable.drum import FREE, STANDING, DrumNumbers
 from cable.moving_end.bdf2 import Weights
 from cable.moving_end.bending import add_bending
+from cable.moving_end.contact import add_contact
 from cable.moving_end.drum_end import drum_row
 from cable.moving_end.segment_load import (
     Load,
@@ -133,6 +134,7 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
             _scatter_length(line, j, length, by_strain, work)
     _keep_tow_force(line, slopes)
     add_bending(line, c)
+    add_contact(line, c, w, slopes)
     if N > 1:
         _sharpen_tow_force(line)
     if line.ends.layout.free_end:

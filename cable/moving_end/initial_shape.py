@@ -22,6 +22,7 @@ from cable.moving_end.state import (
     spacing,
 )
 from cable.properties import CableNumbers, CableProperties
+from cable.sea_bed import SeaBed
 from cable.tow_path import first_direction, segments_needed
 from subzero.jit import compiled
 
@@ -116,6 +117,8 @@ def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, p
     line.velocity[:, : N + 1] = tow + along[:, None] * (drum - tow)
     line.tension[:, 1 : N + 1], line.node_tension[: N + 1] = held.segment_tensions, held.tensions
     ends.tow.force[:], ends.drum_pull = held.tow_force, held.tensions[-1]
+    if held.bed is not None:
+        line.friction[:, : N + 1] = held.bed_friction
 
 
 @compiled
@@ -168,6 +171,24 @@ def set_steady_tow(
     behind = np.cumsum(chords[::-1])[::-1]
     line.position[:, :N] = line.position[NOW, N] - behind[:, None] * t
     line.ends.tow.force[:], line.ends.drum_pull = pulls[-1] * t, pulls[0]
+
+
+def trail_on_bed(line: Line, bed: SeaBed | None) -> None:
+    """Lay what would begin below the bed on it, in the direction in which it would have gone."""
+    N, x, origin = line.ends.count, line.position[NOW], np.asarray(line.ends.origin)
+    if bed is None or bed.below(x[: N + 1] + origin).max() <= 0.0:
+        return
+    chords, away, n = np.diff(x[: N + 1], axis=0), x[N] - x[0], bed.normal
+    away = away - (away @ n) * n
+    size = float(np.linalg.norm(away))
+    away = away / size if size > 0.0 else first_direction(np.zeros((1, 3)))
+    for j in range(1, N + 1):
+        chord = float(np.linalg.norm(chords[j - 1]))
+        x[j] = x[j - 1] + chords[j - 1]
+        if bed.below(x[j] + origin)[0] > 0.0:
+            down = min(max(-float(bed.below(x[j - 1] + origin)[0]), 0.0), chord)
+            x[j] = x[j - 1] + down * n + np.sqrt(chord * chord - down * down) * away
+    line.position[:, : N + 1] = x[: N + 1]
 
 
 def _grown(T: float, length: float, drag: float, weight: float, e: float) -> float:

@@ -128,6 +128,7 @@ class Ends(Record):
         drum_pull: tension at the drum at level NEW. [N]
         drum_force: the cable's pull on it, with the load of the last half segment (3,). [N]
         drum_velocity: of the drum at level NEW (3,). [m/s]
+        origin: place that positions are counted from, in the axes of the sea bed (3,). [m]
         time: of level NOW. [s]
         previous_step: t_now − t_before, 0 after a start. [s]
         layout: how the cable is divided, and the kind of its far end.
@@ -147,6 +148,7 @@ class Ends(Record):
     drum_pull: float
     drum_force: np.ndarray
     drum_velocity: np.ndarray
+    origin: np.ndarray
     time: float
     previous_step: float
     layout: Layout
@@ -167,6 +169,7 @@ class Line(NamedTuple):
         length: unstretched lengths of the segments (nodes,); of the last one, see `Ends.last_length`. [m]
         node_tension: tension at the nodes at level NOW (nodes,). [N]
         water: velocity of the water at the nodes (3 levels, nodes, 3). [m/s]
+        friction: of the sea bed on the nodes, as a share s of its pressure, at levels NEW and NOW (2, nodes, 3). [-]
         forcing: a further force per length on segment j at level NEW (nodes, 3), for made-up solutions. [N/m]
         slip, normal_gain: corrections for the arc that a segment stands for (nodes,), see `chord_correction`. [m/s, 1]
         load: ∫(∂p/∂t + D − w_c k) ds of the segments at level NEW (nodes, 3). [N]
@@ -184,6 +187,7 @@ class Line(NamedTuple):
     length: np.ndarray
     node_tension: np.ndarray
     water: np.ndarray
+    friction: np.ndarray
     forcing: np.ndarray
     slip: np.ndarray
     normal_gain: np.ndarray
@@ -229,6 +233,7 @@ def _new_ends() -> Ends:
         drum_pull=0.0,
         drum_force=np.zeros(3),
         drum_velocity=np.zeros(3),
+        origin=np.zeros(3),
         time=0.0,
         # 0: there is no earlier level.
         previous_step=0.0,
@@ -246,6 +251,7 @@ def _per_node(n: int) -> dict[str, Any]:
         "tension": np.zeros((3, n)),
         "length": np.zeros(n),
         "node_tension": np.zeros(n),
+        "friction": np.zeros((2, n, 3)),
         "forcing": np.zeros((n, 3)),
         "slip": np.zeros(n),
         # A gain of 1 is no correction.
