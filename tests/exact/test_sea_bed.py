@@ -126,9 +126,7 @@ def test_a_cable_drawn_across_the_bed_pulls_with_friction_times_weight(friction)
     bed = SeaBed(depth=0.0, axial_friction=0.0, lateral_friction=friction)
     ends, velocity = np.array([(L, 0.0, 0.0), (0.0, 0.0, 0.0)]), np.array([0.0, speed, 0.0])
     tether = cable.Tether(cord, length=L, ends=ends, segments=n, bed=bed)
-    pulls = [
-        tether.step(0.1, [(end + 0.1 * k * velocity, velocity) for end in ends]) for k in range(1, 301)
-    ]
+    pulls = [tether.step(0.1, [(end + 0.1 * k * velocity, velocity) for end in ends]) for k in range(1, 301)]
     forces = np.mean(pulls[150:], axis=0)  # it swings a little
     lies = cord.weight_in_water * L - forces[:, 2].sum()
     assert -forces[:, 1].sum() == pytest.approx(friction * lies, rel=0.02)
