@@ -37,12 +37,14 @@ from cable.properties import CableProperties
 from cable.pull_out import SCHEMES, pull_out, tow
 from cable.schemes import Equation7, Lumped, MovingEnd, Paper
 from cable.sea_bed import SeaBed
+from cable.sections import Body, Section, SectionedCable, line_type, line_types
 from cable.task import MovingDrum
 from cable.tether import Tether, TetherError, TetherState
 from cable.winch import Brake, ConstantTension, PayOutRate
 
 __all__ = [
     "SCHEMES",
+    "Body",
     "Brake",
     "CableProperties",
     "ConstantTension",
@@ -59,10 +61,14 @@ __all__ = [
     "Paper",
     "PayOutRate",
     "SeaBed",
+    "Section",
+    "SectionedCable",
     "Tether",
     "TetherError",
     "TetherState",
     "hold",
+    "line_type",
+    "line_types",
     "pull_out",
     "tow",
 ]

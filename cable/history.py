@@ -13,8 +13,8 @@ import numpy as np
 
 from cable.current import Current
 from cable.doubts import SLACK_SHARE, above_surface, doubts_of
-from cable.properties import CableProperties
 from cable.sea_bed import SeaBed
+from cable.sections import AnyCable
 from subzero.errors import BadValueError, real, short
 from subzero.files.text_repr import Overview
 
@@ -240,7 +240,7 @@ class Equilibrium:
         bed_friction: of the bed on the nodes, as a share of its pressure, north, east, down (nodes, 3); empty without.
     """
 
-    cable: CableProperties
+    cable: AnyCable
     current: Current
     length: float
     shape: np.ndarray

@@ -17,6 +17,7 @@ from cable.moving_end.segment_load import Load, new_load
 from cable.moving_end.state import NEW, NOW, Line, new_line
 from cable.properties import CableProperties
 from cable.sea_bed import SeaBed
+from cable.sections import COLUMNS, AnyCable, SectionedCable, check_length
 from cable.task import current_of
 from cable.winch import Brake
 from subzero.arguments import checked_arguments
@@ -61,7 +62,7 @@ def hold(
     length: float,
     current: Place | Current | None = None,
     *,
-    cable: CableProperties | None = None,
+    cable: AnyCable | None = None,
     segment_length: float | None = None,
     start: Place | None = None,
     bed: SeaBed | None = None,
@@ -99,7 +100,7 @@ def hold(
     cable, water = CableProperties() if cable is None else cable, current_of(current)
     places = _checked_ends(ends)
     length = _checked_length(places, length, cable)
-    line = _between(places, length, _segments(length, segment_length))
+    line = _between(places, length, _divided(cable, length, segment_length))
     if bed is not None:
         bed.refuse_below(places, "hold")
     starts = [None] if start is None else [_checked_start(start, places), None]
@@ -119,7 +120,7 @@ def hold(
 
 
 def _search(
-    line: Line, nodes: np.ndarray | None, water: Water, cable: CableProperties, bed: SeaBed | None
+    line: Line, nodes: np.ndarray | None, water: Water, cable: AnyCable, bed: SeaBed | None
 ) -> tuple[int, float]:
     """Bring a line to rest from node positions, or from a catenary; return steps (−1: none) and the unit of force."""
     c, work, brake = _at_rest_on(bed, cable), new_load(), Brake().numbers()
@@ -144,9 +145,12 @@ def _sink_onto(
     rough = bed.axial_friction if is_laid else 0.0
     deepest = float(bed.below(line.position[NOW, :nodes] + np.asarray(line.ends.origin)).max())
     soft = min(max(abs(c.weight), WEIGHTLESS) / max(deepest, c.bed_rounding), hard)
+    stiff = c.section[:, -2].copy() if "section" in c.names else 0.0
     stages = int(np.ceil(np.log(hard / soft) / np.log(STIFFER)))
     for k, c.bed_stiffness in enumerate(hard * STIFFER ** -np.arange(stages, -1.0, -1.0)):
         line.tension[:] *= scale if k > 0 else 1.0
+        if "section" in c.names:
+            c.section[:, -2] = stiff * c.bed_stiffness / hard
         steps, scale = _come_to_rest(line, water, c, brake, work, scale)
         if steps < 0:
             return steps, scale
@@ -179,7 +183,7 @@ def _come_to_rest(
     return steps, scale
 
 
-def _at_rest_on(bed: SeaBed | None, cable: CableProperties) -> Any:
+def _at_rest_on(bed: SeaBed | None, cable: AnyCable) -> Any:
     """Return the cable's numbers for a search for rest."""
     c: Any = cable.numbers(bed)
     if bed is not None:
@@ -199,7 +203,11 @@ def _in_units_of(scale: float, c: Any) -> Any:
     for name in c.names:
         if name in FORCES:
             c[name] = c[name] / scale
+        elif name in ("section", "body"):
+            c[name] /= scale
     c.compliance *= scale
+    if "section" in c.names:
+        c.section[:, COLUMNS.index("compliance")] *= scale * scale
     return c
 
 
@@ -240,7 +248,7 @@ def _positive(name: str, given: object) -> float:
     return length
 
 
-def _checked_length(places: np.ndarray, given: float, cable: CableProperties) -> float:
+def _checked_length(places: np.ndarray, given: float, cable: AnyCable) -> float:
     """Return the length; raise an error if no cable of that length reaches, or if it is not a length. [m]."""
     length = _positive("length", given)
     apart = float(np.linalg.norm(places[0] - places[1]))
@@ -288,13 +296,23 @@ def _checked_start(start: Place, places: np.ndarray) -> np.ndarray:
     return from_second_end
 
 
-def _between(places: np.ndarray, length: float, count: int) -> Line:
-    """Return a line of even segments, with its ends where they are held."""
+def _divided(cable: AnyCable, length: float, segment_length: float | None) -> np.ndarray:
+    """Return the lengths of segments: even, but between ends of sections and bodies. [m]."""
+    count = _segments(length, segment_length)
+    if isinstance(cable, SectionedCable):
+        check_length(cable, length)
+        return cable.divided(length / count)
+    return np.full(count, length / count)
+
+
+def _between(places: np.ndarray, length: float, lengths: np.ndarray) -> Line:
+    """Return a line of segments (n,) [m], with its ends where they are held."""
+    count = lengths.size
     line = new_line(count)
     line.ends.count = count
-    line.length[1 : count + 1] = line.ends.layout.segment_length = length / count
-    line.ends.last_length[:] = length / count
-    line.ends.settled = length - length / count
+    line.length[1 : count + 1] = lengths
+    line.ends.layout.segment_length = line.ends.last_length[:] = lengths[-1]
+    line.ends.settled = length - lengths[-1]
     line.position[:, 0] = places[0] - places[1]
     line.ends.origin[:] = places[1]
     return line
@@ -312,7 +330,7 @@ def _found(
     line: Line,
     places: np.ndarray,
     length: float,
-    cable: CableProperties,
+    cable: AnyCable,
     current: Current,
     steps: int,
     scale: float,

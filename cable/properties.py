@@ -53,6 +53,29 @@ class LaidCableNumbers(CableNumbers):
     is_at_rest: bool
 
 
+class SectionedCableNumbers(LaidCableNumbers):
+    """The same of a line of sections and bodies: always of one section, and all of them, see `cable.sections`.
+
+    Attributes:
+        section: numbers of each (sections, 9), `sections.COLUMNS`, then k and c of the bed.
+        section_end: where each ends, from the tow point; the last is endless (sections,). [m]
+        section_now, section_segment, section_along: the section that the record describes, of which segment, and
+            where that ends. [-], [-], [m]
+        body: m, ρC_aV, weight in water, ½ρC_dA, ½ρC_LA of each body (bodies, 5).
+        body_place: distance from the tow point (bodies,). [m]
+        body_count: how many there are.
+    """
+
+    section: np.ndarray
+    section_end: np.ndarray
+    section_now: int
+    section_segment: int
+    section_along: float
+    body: np.ndarray
+    body_place: np.ndarray
+    body_count: int
+
+
 class StiffLaidCableNumbers(LaidCableNumbers):
     """The same of a cable that resists bending, with EI [N m²]."""
 

@@ -15,10 +15,20 @@ import numpy as np
 from cable.current import Current
 from cable.history import Equilibrium, History
 from cable.moving_end import time_loop
-from cable.properties import CableProperties
 from cable.schemes import Equation7, Lumped, MovingEnd, Options, Paper
 from cable.sea_bed import SeaBed
-from cable.task import EQUILIBRIUM, EVERYTHING, INTERNAL_DAMPING, SEA_BED, Drum, MovingDrum, PullOut, Tow
+from cable.sections import AnyCable
+from cable.task import (
+    EQUILIBRIUM,
+    EVERYTHING,
+    INTERNAL_DAMPING,
+    SEA_BED,
+    SECTIONS,
+    Drum,
+    MovingDrum,
+    PullOut,
+    Tow,
+)
 from cable.tow_path import Velocity
 from subzero.arguments import checked_arguments
 from subzero.errors import BadValueError, short, suggestion
@@ -67,7 +77,10 @@ SCHEMES: Mapping[str, Scheme] = {
     "paper_drum": Scheme(Paper(reading="drum"), _in_angles, None, PLAIN),
     "equation7": Scheme(Equation7(), _in_angles, None, PLAIN),
     "lumped": Scheme(
-        Lumped(), _lumped_pull_out, _lumped_tow, EVERYTHING - {EQUILIBRIUM, INTERNAL_DAMPING, SEA_BED}
+        Lumped(),
+        _lumped_pull_out,
+        _lumped_tow,
+        EVERYTHING - {EQUILIBRIUM, INTERNAL_DAMPING, SEA_BED, SECTIONS},
     ),
 }
 """Name → the scheme; the first is the default, and "paper" the usable reading of the paper's."""
@@ -78,7 +91,7 @@ def pull_out(
     tow_velocity: Velocity,
     duration: float,
     *,
-    cable: CableProperties | None = None,
+    cable: AnyCable | None = None,
     drum: Drum | MovingDrum | None = None,
     current: Sequence[float] | np.ndarray | Current | None = None,
     start: float | Equilibrium = 0.0,
@@ -134,7 +147,7 @@ def tow(
     length: float,
     duration: float,
     *,
-    cable: CableProperties | None = None,
+    cable: AnyCable | None = None,
     current: Sequence[float] | np.ndarray | Current | None = None,
     drogue_drag_area: float = 0.0,
     bed: SeaBed | None = None,

@@ -17,10 +17,11 @@ from cable.history import Equilibrium
 from cable.properties import CableProperties
 from cable.schemes import SHORTEST_S
 from cable.sea_bed import SeaBed
+from cable.sections import AnyCable, SectionedCable
 from cable.tow_path import Velocity
 from cable.winch import Winch
 from subzero.arguments import checked_arguments
-from subzero.errors import checked
+from subzero.errors import BadValueError, checked
 
 Drum = DrumProperties | Winch
 START_LENGTH = 1e-6
@@ -30,8 +31,9 @@ WINCH, MOVING_DRUM, UNEVEN_CURRENT = "a winch", "a drum that moves", "a current 
 WET_LENGTH, EQUILIBRIUM = "cable in the water at the start", "a start from cable.hold"
 INTERNAL_DAMPING = "internal damping of the cable"
 SEA_BED = "a sea bed"
+SECTIONS = "a cable of several sections"
 EVERYTHING = frozenset(
-    {WINCH, MOVING_DRUM, UNEVEN_CURRENT, WET_LENGTH, EQUILIBRIUM, INTERNAL_DAMPING, SEA_BED}
+    {WINCH, MOVING_DRUM, UNEVEN_CURRENT, WET_LENGTH, EQUILIBRIUM, INTERNAL_DAMPING, SEA_BED, SECTIONS}
 )
 """Features that a task may ask for beyond a free drum on the shore, uniform water and no cable at the start."""
 
@@ -68,7 +70,7 @@ class PullOut:
 
     tow_velocity: Velocity
     duration: float
-    cable: CableProperties
+    cable: AnyCable
     drum: Drum
     drum_velocity: Velocity | None
     current: Current
@@ -82,7 +84,7 @@ class PullOut:
         tow_velocity: Velocity,
         duration: float,
         *,
-        cable: CableProperties | None = None,
+        cable: AnyCable | None = None,
         drum: Drum | MovingDrum | None = None,
         current: Sequence[float] | np.ndarray | Current | None = None,
         start: float | Equilibrium = 0.0,
@@ -128,6 +130,7 @@ class PullOut:
             EQUILIBRIUM: isinstance(self.start, Equilibrium),
             INTERNAL_DAMPING: self.cable.internal_damping > 0.0,
             SEA_BED: self.bed is not None,
+            SECTIONS: isinstance(self.cable, SectionedCable),
         }
         return [what for what, is_asked in asked.items() if is_asked]
 
@@ -149,7 +152,7 @@ class Tow:
     tow_velocity: Velocity
     length: float
     duration: float
-    cable: CableProperties
+    cable: AnyCable
     current: Current
     drogue_drag_area: float
     bed: SeaBed | None
@@ -161,7 +164,7 @@ class Tow:
         length: float,
         duration: float,
         *,
-        cable: CableProperties | None = None,
+        cable: AnyCable | None = None,
         current: Sequence[float] | np.ndarray | Current | None = None,
         drogue_drag_area: float = 0.0,
         bed: SeaBed | None = None,
@@ -199,6 +202,13 @@ def current_of(current: Sequence[float] | np.ndarray | Current | None) -> Curren
     return Current.uniform(np.zeros(3) if current is None else current)
 
 
-def _cable_of(cable: CableProperties | None) -> CableProperties:
+def uniform(cable: AnyCable) -> CableProperties:
+    """Return a cable that is one section, for a scheme that knows no others."""
+    if isinstance(cable, SectionedCable):
+        raise BadValueError(f"This scheme does not know {SECTIONS}; use 'moving_end'.")
+    return cable
+
+
+def _cable_of(cable: AnyCable | None) -> AnyCable:
     """Return the cable, that of Table 1 when none is given."""
     return CableProperties() if cable is None else cable

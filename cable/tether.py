@@ -56,6 +56,7 @@ from cable.moving_end.stops import Names, describe_bad_number, describe_jump, de
 from cable.properties import CableProperties
 from cable.schemes import COARSEST, FINEST, SHORTEST_S, TOLERANCE
 from cable.sea_bed import SeaBed
+from cable.sections import AnyCable
 from cable.task import START_LENGTH, Drum, current_of
 from cable.tow_path import segments_needed
 from cable.winch import SHORTEST, Brake, ConstantTension, PayOutRate
@@ -115,7 +116,7 @@ class Tether:
     @checked_arguments
     def __init__(
         self,
-        cable: CableProperties | None = None,
+        cable: AnyCable | None = None,
         *,
         ends: Sequence[Any] | np.ndarray,
         length: float | None = None,

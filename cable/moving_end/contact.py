@@ -19,6 +19,7 @@ from math import sqrt
 import numpy as np
 
 from cable.moving_end.bdf2 import Weights
+from cable.moving_end.composition import select_section
 from cable.moving_end.state import DIAGONAL, NEW, NOW, RESIDUAL, Line, held_node
 from cable.properties import CableNumbers, LaidCableNumbers
 from subzero.jit import by_field, by_field_in_step, compiled, inlined, inner, scratch
@@ -62,6 +63,7 @@ def _press(line: Line, c: LaidCableNumbers, w: Weights, slopes: bool) -> None:
     last, n = min(held_node(line), line.ends.count + 1), c.bed_normal
     for j in range(1, last):
         p = sunk_by(line, NEW, j, c)
+        select_section(line, c, j)
         for i in range(3):
             line.friction[NEW, j, i] = 0.0
         if p <= 0.0:
@@ -159,6 +161,7 @@ def _power_to_bed(line: Line, c: LaidCableNumbers) -> float:
     power, last, n = 0.0, min(held_node(line), line.ends.count + 1), c.bed_normal
     for j in range(1, last):
         p, length, rate = sunk_by(line, NOW, j, c), carried_length(line, j), 0.0
+        select_section(line, c, j)
         if p <= 0.0:
             continue
         for i in range(3):

@@ -23,6 +23,7 @@ from __future__ import annotations
 import numpy as np
 
 from cable.moving_end.bending import bending_energy
+from cable.moving_end.composition import body_flow, select_section
 from cable.moving_end.contact import power_to_bed
 from cable.moving_end.segment_load import Load, evaluate_load, measured_chord, take_segment
 from cable.moving_end.slack_law import KNOWN
@@ -44,6 +45,7 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
     for j in range(1, N + 1):
         length = line.ends.last_length[NOW] if j == N else line.length[j]
         T = line.tension[NOW, j]
+        select_section(line, c, j)
         take_segment(line.position[NOW], line.velocity[NOW], line.water[NOW], j, work)
         work.square, work.chord_length, work.shorter = measured_chord(line.position[NOW], j, length)
         evaluate_load(T, line.slip[j], line.normal_gain[j], 0.0, c, work)
@@ -64,7 +66,13 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
         sunk += length * c.weight * (V[2] - J[2])
         added -= c.added_mass * work.along * turn * length / work.chord_length
         carried += length * c.mass * _carried(line, j)
-    out[LOSS], out[STORED], out[GRAVITY_WORK], out[ADDED_MASS] = loss, energy, sunk, added
+    lost, held, fallen = body_flow(line, c)
+    out[LOSS], out[STORED], out[GRAVITY_WORK], out[ADDED_MASS] = (
+        loss + lost,
+        energy + held,
+        sunk + fallen,
+        added,
+    )
     out[STRAINED], out[CARRIED], out[AT_DRUM], out[TOWED] = strained, carried, 0.0, 0.0
     out[DAMPED], out[TO_BED] = damped, power_to_bed(line, c)
     out[STORED] += bending_energy(line, c)

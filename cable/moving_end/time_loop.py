@@ -22,6 +22,7 @@ from cable.drum_motion import PLACE, SETPOINT, VELOCITY, drum_path, hermite, lea
 from cable.history import Equilibrium, History, Outcome
 from cable.moving_end.energy import FLOWS, LOSS, STORED, book_step, energy_flow
 from cable.moving_end.initial_shape import (
+    division,
     lay_held,
     lay_straight,
     set_steady_tow,
@@ -253,7 +254,7 @@ def tow(task: Tow, scheme: MovingEnd) -> History:
     """Tow a cable of fixed length, as `cable.tow` does."""
     path = sample_path(task.tow_velocity, task.duration, scheme.time_step)
     segments_needed(task.length, scheme.segment_length, 0.0)  # refuses a cable of countless ones
-    count = max(1, int(np.ceil(task.length / scheme.segment_length - 1e-9)))
+    count = division(task.cable, task.length, scheme.segment_length)
     check_memory(path.times.size, count)
     line, c, idle = new_line(count), task.cable.numbers(task.bed), DrumProperties().numbers()
     _refuse_below(task.bed, np.zeros((1, 3)))
@@ -263,7 +264,7 @@ def tow(task: Tow, scheme: MovingEnd) -> History:
     lay_straight(line, task.length, uphill, path.leaving[0], idle, c)
     line.ends.layout.free_end, line.ends.layout.tail_drag = True, tail_drag
     line.ends.solver.tolerance = scheme.tolerance
-    set_steady_tow(line, path.leaving[0], J, task.cable, tail_drag)
+    set_steady_tow(line, path.leaving[0], J, task.cable, tail_drag, scheme.segment_length)
     path.place[:] += line.position[NOW, 0]
     # Places are counted from the tail: with this origin the tow point starts at (0, 0, 0), where J was taken.
     origin = line.ends.origin[:] = -line.position[NOW, 0]
