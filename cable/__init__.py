@@ -18,8 +18,8 @@ R_d, I_d, C_f  drum: radius, inertia, friction      m …       (11)            
 F_c            force on the vehicle                 N         (12), f_1 − ½Q_1                   moving_end/assembly
 α, β           angles of the paper's local frame    rad       (3)-(4)                            feng_allen/equation7
 
-What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`properties`, `drum`, `winch`, `current`,
-`schemes`) and give (`history`); and `tether.Tether`, which another simulator steps, in the default formulation. A call
+What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`properties`, `sections`, `sea_bed`, `drum`,
+`winch`, `current`, `schemes`) and give (`history`); and `tether.Tether`, which another simulator steps, in the default formulation. A call
 makes a `task` of it, which one of three formulations computes; they share nothing else:
 
 * `moving_end`, the default: balances are vectors (their equivalence with the paper's six scalar equations, whose signs
@@ -33,6 +33,7 @@ from cable.current import Current
 from cable.drum import DrumProperties
 from cable.history import Equilibrium, History, Outcome
 from cable.hold import HoldError, hold
+from cable.moordyn_deck import Deck, DeckLine, read_deck
 from cable.properties import CableProperties
 from cable.pull_out import SCHEMES, pull_out, tow
 from cable.schemes import Equation7, Lumped, MovingEnd, Paper
@@ -49,6 +50,8 @@ __all__ = [
     "CableProperties",
     "ConstantTension",
     "Current",
+    "Deck",
+    "DeckLine",
     "DrumProperties",
     "Equation7",
     "Equilibrium",
@@ -70,5 +73,6 @@ __all__ = [
     "line_type",
     "line_types",
     "pull_out",
+    "read_deck",
     "tow",
 ]
