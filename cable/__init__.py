@@ -18,9 +18,9 @@ R_d, I_d, C_f  drum: radius, inertia, friction      m …       (11)            
 F_c            force on the vehicle                 N         (12), f_1 − ½Q_1                   moving_end/assembly
 α, β           angles of the paper's local frame    rad       (3)-(4)                            feng_allen/equation7
 
-What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`properties`, `sections`, `sea_bed`, `drum`,
-`winch`, `current`, `schemes`) and give (`history`); and `tether.Tether`, which another simulator steps, in the default formulation. A call
-makes a `task` of it, which one of three formulations computes; they share nothing else:
+What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`properties`, `sections`, `sea_bed`,
+`drum`, `winch`, `current`, `schemes`) and give (`history`); and `tether.Tether`, which another simulator steps, in the
+default formulation. A call makes a `task` of it, which one of three formulations computes; they share nothing else:
 
 * `moving_end`, the default: balances are vectors (their equivalence with the paper's six scalar equations, whose signs
   are derived again, is in `feng_allen.equation7` and tested), time is differenced backward, and a step is solved by

@@ -1,8 +1,8 @@
 """Read the lines of a MoorDyn v2 input file: line types, points, lines, the sea bed and the water.
 
 Lines that meet at a free point are one line of sections here, with the point's mass and volume as a body; so a deck is
-a number of lines between held points (fixed, coupled, or to a vessel), each of which `hold` brings to rest. What a
-deck may ask for and this package does not compute is left out, and said in `Deck.left_out`. Axes: MoorDyn's z is up;
+a number of lines between held points (fixed, coupled, or to a vessel), each of which `cable.hold` brings to rest. What
+a deck may ask for and this package does not compute is left out, and said in `Deck.left_out`. Axes: MoorDyn's z is up;
 north is x, east is −y. Format: https://moordyn.readthedocs.io, "MoorDyn V2 input file".
 """
 
@@ -14,8 +14,6 @@ from math import isfinite
 
 import numpy as np
 
-from cable.history import Equilibrium
-from cable.hold import hold
 from cable.properties import GRAVITY, CableProperties
 from cable.sea_bed import SeaBed
 from cable.sections import Body, Section, SectionedCable
@@ -86,12 +84,6 @@ class DeckLine:
     length: float
     segment_length: float
     bed: SeaBed | None
-
-    def at_rest(self) -> Equilibrium:
-        """Return its equilibrium in still water."""
-        return hold(
-            self.ends, self.length, cable=self.cable, segment_length=self.segment_length, bed=self.bed
-        )
 
 
 @dataclass(frozen=True, kw_only=True)

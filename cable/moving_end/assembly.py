@@ -38,7 +38,7 @@ import numpy as np
 from cable.drum import FREE, STANDING, DrumNumbers
 from cable.moving_end.bdf2 import Weights
 from cable.moving_end.bending import add_bending
-from cable.moving_end.composition import add_bodies, select_section
+from cable.moving_end.composition import add_bodies
 from cable.moving_end.contact import add_contact
 from cable.moving_end.drum_end import drum_row
 from cable.moving_end.segment_load import (
@@ -59,6 +59,7 @@ from cable.moving_end.state import (
     UPPER,
     Line,
     held_node,
+    select_section,
 )
 from cable.properties import CableNumbers
 from subzero.jit import compiled, inlined, inner

@@ -1,7 +1,7 @@
 """Sections and bodies in the balances (`cable.sections`); a uniform cable compiles nothing of this.
 
-The record of a sectioned cable always describes one of its sections: a loop over segments selects that of each, which
-costs nothing while the section is the same. A body adds its inertia, drag, weight and lift to the balance of its node:
+The record of a sectioned cable always describes one of its sections: a loop over segments selects that of each
+(`state.select_section`). A body adds its inertia, drag, weight and lift to the balance of its node:
 the one that is nearest to its place.
 """
 
@@ -12,7 +12,7 @@ from math import sqrt
 import numpy as np
 
 from cable.moving_end.bdf2 import Weights
-from cable.moving_end.state import BEFORE, DIAGONAL, NEW, NOW, RESIDUAL, Line, held_node
+from cable.moving_end.state import BEFORE, DIAGONAL, NEW, NOW, RESIDUAL, Line, find_section, held_node
 from cable.properties import CableNumbers, SectionedCableNumbers
 from subzero.jit import by_field, by_field_at, by_field_in_step, compiled, inlined, inner
 
@@ -21,30 +21,6 @@ from subzero.jit import by_field, by_field_at, by_field_in_step, compiled, inlin
 def _length(line: Line, j: int) -> float:
     """Return the length of segment j at level NOW. [m]."""
     return line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
-
-
-@compiled
-def find_section(line: Line, c: SectionedCableNumbers, j: int) -> None:
-    """Make c describe the section that segment j is in: the one that holds its middle."""
-    if j != c.section_segment + 1:  # no loop along the cable: count from the tow point
-        c.section_along = 0.0
-        for before in range(1, j):
-            c.section_along += _length(line, before)
-    k, middle = 0, c.section_along + 0.5 * _length(line, j)
-    while middle > c.section_end[k]:
-        k += 1
-    c.section_along, c.section_segment = c.section_along + _length(line, j), j
-    if k == c.section_now:
-        return
-    row, c.section_now = c.section[k], k
-    c.mass, c.added_mass, c.weight, c.compliance = row[0], row[1], row[2], row[3]
-    c.retardation, c.tangential_drag, c.normal_drag = row[4], row[5], row[6]
-    c.bed_stiffness, c.bed_damping = row[7], row[8]
-
-
-@inner
-def _is_uniform(line: Line, c: CableNumbers, j: int) -> None:
-    """Select nothing."""
 
 
 @compiled
@@ -144,7 +120,6 @@ def _none_carried(line: Line, c: CableNumbers, j: int) -> float:
 
 
 carried_weight = by_field_at("section_end", _carried, _none_carried)
-select_section = by_field_at("section_end", find_section, _is_uniform)
 add_bodies = by_field_in_step("section_end", _load_nodes, _load_nothing)
 add_body_masses = by_field("section_end", _add_mass, _add_no_mass)
 body_flow = by_field("section_end", _flow, _no_flow)

@@ -19,8 +19,7 @@ from math import sqrt
 import numpy as np
 
 from cable.moving_end.bdf2 import Weights
-from cable.moving_end.composition import select_section
-from cable.moving_end.state import DIAGONAL, NEW, NOW, RESIDUAL, Line, held_node
+from cable.moving_end.state import DIAGONAL, NEW, NOW, RESIDUAL, Line, held_node, select_section
 from cable.properties import CableNumbers, LaidCableNumbers
 from subzero.jit import by_field, by_field_in_step, compiled, inlined, inner, scratch
 

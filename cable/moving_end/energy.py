@@ -23,11 +23,11 @@ from __future__ import annotations
 import numpy as np
 
 from cable.moving_end.bending import bending_energy
-from cable.moving_end.composition import body_flow, select_section
+from cable.moving_end.composition import body_flow
 from cable.moving_end.contact import power_to_bed
 from cable.moving_end.segment_load import Load, evaluate_load, measured_chord, take_segment
 from cable.moving_end.slack_law import KNOWN
-from cable.moving_end.state import BEFORE, NOW, Line
+from cable.moving_end.state import BEFORE, NOW, Line, select_section
 from cable.properties import CableNumbers
 from subzero.jit import compiled, inlined, inner
 

@@ -27,7 +27,7 @@ from cable.current import Water
 from cable.drum import DrumNumbers
 from cable.moving_end.bdf2 import Weights
 from cable.moving_end.chord_correction import correct_for_arc
-from cable.moving_end.composition import carried_weight, select_section
+from cable.moving_end.composition import carried_weight
 from cable.moving_end.remeshing import fill_node_tensions
 from cable.moving_end.segment_load import Load, evaluate_load, measured_chord, segment_momentum, take_segment
 from cable.moving_end.slack_law import SMOOTHING, SOFTEST
@@ -37,6 +37,7 @@ from cable.moving_end.state import (
     NOW,
     Line,
     sample_water,
+    select_section,
 )
 from cable.moving_end.time_step import solve_step
 from cable.properties import CableNumbers

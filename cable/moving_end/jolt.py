@@ -20,10 +20,10 @@ import numpy as np
 
 from cable.drum import LENGTH, SPINNING, STANDING, TENSION, DrumNumbers
 from cable.moving_end.block_solver import solve
-from cable.moving_end.composition import add_body_masses, select_section
+from cable.moving_end.composition import add_body_masses
 from cable.moving_end.segment_load import Load, segment_momentum
 from cable.moving_end.slack_law import chord_length, squared_share
-from cable.moving_end.state import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line
+from cable.moving_end.state import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line, select_section
 from cable.properties import CableNumbers
 from subzero.jit import allocating, inlined, inner
 

@@ -20,9 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from cable.moving_end.composition import select_section
 from cable.moving_end.slack_law import chord_length, squared_share, turning_rate
-from cable.moving_end.state import NOW, Line
+from cable.moving_end.state import NOW, Line, select_section
 from cable.properties import CableNumbers
 from subzero.jit import Record, inlined, inner, made_once
 

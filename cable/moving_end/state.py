@@ -16,8 +16,9 @@ import numpy as np
 from cable.current import Water, water_velocity
 from cable.drum import TURNING
 from cable.moving_end.slack_law import SMOOTHING
+from cable.properties import CableNumbers, SectionedCableNumbers
 from cable.schemes import TOLERANCE
-from subzero.jit import Record, inlined, inner, made_once
+from subzero.jit import Record, by_field_at, compiled, inlined, inner, made_once
 
 # Levels of time: indices of the first axis of the arrays of `Line`.
 NEW, NOW, BEFORE = 0, 1, 2
@@ -320,3 +321,37 @@ def sample_water(line: Line, water: Water, time: float) -> None:
     # Places on level NEW: the water is sampled for the predicted shape.
     for j in range(line.ends.count + 1):
         J[j, 0], J[j, 1], J[j, 2] = water_velocity(water, x[j, 0], x[j, 1], x[j, 2], time)
+
+
+@inlined
+def _now_length(line: Line, j: int) -> float:
+    """Return the length of segment j at level NOW. [m]."""
+    return line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
+
+
+@compiled
+def find_section(line: Line, c: SectionedCableNumbers, j: int) -> None:
+    """Make c describe the section that segment j is in: the one that holds its middle."""
+    if j != c.section_segment + 1:  # no loop along the cable: count from the tow point
+        c.section_along = 0.0
+        for before in range(1, j):
+            c.section_along += _now_length(line, before)
+    k, middle = 0, c.section_along + 0.5 * _now_length(line, j)
+    while middle > c.section_end[k]:
+        k += 1
+    c.section_along, c.section_segment = c.section_along + _now_length(line, j), j
+    if k == c.section_now:
+        return
+    row, c.section_now = c.section[k], k
+    c.mass, c.added_mass, c.weight, c.compliance = row[0], row[1], row[2], row[3]
+    c.retardation, c.tangential_drag, c.normal_drag = row[4], row[5], row[6]
+    c.bed_stiffness, c.bed_damping = row[7], row[8]
+
+
+@inner
+def _is_uniform(line: Line, c: CableNumbers, j: int) -> None:
+    """Select nothing."""
+
+
+select_section = by_field_at("section_end", find_section, _is_uniform)
+"""Make the numbers of a cable describe the section of a segment; a uniform cable compiles nothing of it."""

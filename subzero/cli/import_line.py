@@ -25,11 +25,17 @@ def import_line(deck: Path, *, output_mode: OutputMode = PLAIN) -> int:
     """
     import numpy as np
 
-    from cable import read_deck
+    from cable import hold, read_deck
     from subzero.files.read_file import read_text
 
     found = read_deck(read_text(deck, LARGEST_DECK))
-    rests = [(line, line.at_rest()) for line in found.lines]
+    rests = [
+        (
+            line,
+            hold(line.ends, line.length, cable=line.cable, segment_length=line.segment_length, bed=line.bed),
+        )
+        for line in found.lines
+    ]
     rows = [
         {
             "line": line.name,

@@ -17,6 +17,7 @@ from subzero.steady_motion.hull_state_space import ACTUATORS, PLACE, STATES, SUR
 
 if TYPE_CHECKING:
     import scenarios
+from cable import SeaBed
     from subzero.model import Model
 
 
@@ -69,7 +70,7 @@ def above_surface(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
 def below_sea_bed(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
     """Return warnings of a vehicle below the sea bed of the trial, or of a cable that it takes there.
 
-    The bed holds the cable; lying on it, that sinks in by less than its diameter.
+    The bed holds the cable, which sinks in a little.
     """
     if trial.sea_bed <= 0.0:
         return []
@@ -77,7 +78,8 @@ def below_sea_bed(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str
         "where it cannot be: the bed holds the cable, and no vehicle. Change the trial, or water.sea_bed_m."
     )
     where = f"below the sea bed at {trial.sea_bed:g} m"
-    sinks = model.cable.diameter
+    # By a diameter, and twice as deep as at rest, a cable may be pressed in.
+    sinks = model.cable.diameter + 2.0 * SeaBed(depth=trial.sea_bed).sinkage(model.cable)
     return _out_of_bounds(run, model, lambda depth: depth - trial.sea_bed, where, words, sinks)
 
 

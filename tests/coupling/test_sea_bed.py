@@ -1,8 +1,8 @@
 """An umbilical over a sea bed that it reaches, while its vehicle is deployed.
 
-Verifies: with the bed at 50 m (the vehicle goes to 44.6 m, the cable without a bed to 63.9 m) no node is deeper than the
-bed by a diameter, hundreds of results have cable on the bed, the pull changes, and the run takes no more than twice the
-iterations of today's. Tolerance: a diameter, 25 mm, as the pages say.
+Verifies: with the bed at 50 m (the vehicle goes to 44.6 m, the cable without a bed to 63.9 m) no node is deeper than
+the bed by a diameter, hundreds of results have cable on the bed, the pull changes, and the run takes no more than twice
+the iterations of today's. Tolerance: a diameter, 25 mm, as the pages say.
 """
 
 import numpy as np

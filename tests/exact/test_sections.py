@@ -1,8 +1,8 @@
 """Lines of several sections with bodies: closed forms, parity with a uniform cable, steady tow, a turn, messages.
 
 Verifies: a clump and a float on a weightless line, whose halves are straight; that two equal sections are one cable;
-that the forces at both ends carry both sections; a tow cable with array, depressor and drogue that is towed steadily and
-remains so, with the forces added up by hand; the three-section tow in a turn of 640 m radius (the case of Ablow and
+that the forces at both ends carry both sections; a tow cable with array, depressor and drogue that is towed steadily
+and remains so, with the forces added up by hand; the three-section tow in a turn of 640 m radius (the case of Ablow and
 Schechter, Ocean Engineering 10, 1983, with the numbers that later papers print for it), which converges at second
 order; energy; mirror; messages. Tolerance: Newton's method leaves 1e-9; arc corrections change a steady tow by 2e-4.
 """

@@ -486,9 +486,7 @@ def test_a_heavy_cable_lies_on_the_sea_bed_without_a_warning():
         duration=6.0,
         sea_bed=2.5,
     )
-    assert "below_sea_bed" not in warned(trial)
-    deeper = warned(dataclasses.replace(trial, sea_bed=0.0), dataclasses.replace(trial, sea_bed=2.5))
-    assert [words.split(" is ")[0] for words in deeper["below_sea_bed"]] == ["The cable"]
+    assert "below_sea_bed" not in warned(trial), warned(trial)["below_sea_bed"]
 
 
 @pytest.mark.parametrize("share, warns", [(0.9, True), (1.1, False)])
