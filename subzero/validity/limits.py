@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cable import SeaBed
 from cable.doubts import ROUNDING
 from subzero.channels import DEGREE, AnyRun
 from subzero.steady_motion.hull_state_space import ACTUATORS, PLACE, STATES, SURGE, ideal, rate
 
 if TYPE_CHECKING:
     import scenarios
-from cable import SeaBed
     from subzero.model import Model
 
 
