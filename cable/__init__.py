@@ -18,9 +18,9 @@ R_d, I_d, C_f  drum: radius, inertia, friction      m …       (11)            
 F_c            force on the vehicle                 N         (12), f_1 − ½Q_1                   moving_end/assembly
 α, β           angles of the paper's local frame    rad       (3)-(4)                            feng_allen/equation7
 
-What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`properties`, `drum`, `winch`, `current`,
-`schemes`) and give (`history`); and `tether.Tether`, which another simulator steps, in the default formulation. A call
-makes a `task` of it, which one of three formulations computes; they share nothing else:
+What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`properties`, `sections`, `sea_bed`,
+`drum`, `winch`, `current`, `schemes`) and give (`history`); and `tether.Tether`, which another simulator steps, in the
+default formulation. A call makes a `task` of it, which one of three formulations computes; they share nothing else:
 
 * `moving_end`, the default: balances are vectors (their equivalence with the paper's six scalar equations, whose signs
   are derived again, is in `feng_allen.equation7` and tested), time is differenced backward, and a step is solved by
@@ -33,19 +33,25 @@ from cable.current import Current
 from cable.drum import DrumProperties
 from cable.history import Equilibrium, History, Outcome
 from cable.hold import HoldError, hold
+from cable.moordyn_deck import Deck, DeckLine, read_deck
 from cable.properties import CableProperties
 from cable.pull_out import SCHEMES, pull_out, tow
 from cable.schemes import Equation7, Lumped, MovingEnd, Paper
+from cable.sea_bed import SeaBed
+from cable.sections import Body, Section, SectionedCable, line_type, line_types
 from cable.task import MovingDrum
 from cable.tether import Tether, TetherError, TetherState
 from cable.winch import Brake, ConstantTension, PayOutRate
 
 __all__ = [
     "SCHEMES",
+    "Body",
     "Brake",
     "CableProperties",
     "ConstantTension",
     "Current",
+    "Deck",
+    "DeckLine",
     "DrumProperties",
     "Equation7",
     "Equilibrium",
@@ -57,10 +63,16 @@ __all__ = [
     "Outcome",
     "Paper",
     "PayOutRate",
+    "SeaBed",
+    "Section",
+    "SectionedCable",
     "Tether",
     "TetherError",
     "TetherState",
     "hold",
+    "line_type",
+    "line_types",
     "pull_out",
+    "read_deck",
     "tow",
 ]

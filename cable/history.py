@@ -13,12 +13,15 @@ import numpy as np
 
 from cable.current import Current
 from cable.doubts import SLACK_SHARE, above_surface, doubts_of
-from cable.properties import CableProperties
+from cable.range_graph import dataset_of, figure_of
+from cable.sea_bed import SeaBed
+from cable.sections import AnyCable
 from subzero.errors import BadValueError, real, short
 from subzero.files.text_repr import Overview
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
 LABELS = {
     "time": ("s", "time since the start"),
@@ -235,9 +238,11 @@ class Equilibrium:
         segment_lengths: unstretched (nodes − 1,). [m]
         segment_tensions: in the segments (nodes − 1,). [N]
         steps: how many steps the search took; 2 or 3 where Newton's method came through at once.
+        bed: the sea bed; None without.
+        bed_friction: of the bed on the nodes, as a share of its pressure, north, east, down (nodes, 3); empty without.
     """
 
-    cable: CableProperties
+    cable: AnyCable
     current: Current
     length: float
     shape: np.ndarray
@@ -247,6 +252,8 @@ class Equilibrium:
     segment_lengths: np.ndarray
     segment_tensions: np.ndarray
     steps: int
+    bed: SeaBed | None = None
+    bed_friction: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def slack_length(self) -> float:
@@ -262,6 +269,21 @@ class Equilibrium:
         if share <= SLACK_SHARE:
             return high
         return (f"{100.0 * share:.3g} % of the cable is slack: there its shape means nothing.", *high)
+
+    def to_dataset(self) -> xr.Dataset:
+        """Return places, tension, declination, curvature and bend radius at the nodes, as `cable.range_graph` says.
+
+        >>> import cable
+        >>> heavy = cable.CableProperties(mass_per_length=0.02)
+        >>> rest = cable.hold([(9.0, 0.0, 0.0), (0.0, 0.0, 0.0)], 10.0, cable=heavy)
+        >>> round(float(rest.to_dataset()["bend_radius"].min()), 1)
+        5.6
+        """
+        return dataset_of(self)
+
+    def plot(self) -> Figure:
+        """Return a matplotlib figure: the cable from the side, and its tension, declination and curvature."""
+        return figure_of(self)
 
     def __repr__(self) -> str:
         """Return the cable at rest in a few lines."""

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from cable.current import Current, Water
+from cable.drum import DrumNumbers
 from cable.history import Equilibrium
+from cable.moving_end.contact import friction_at_rest
 from cable.moving_end.equilibrium import hang, relax
-from cable.moving_end.segment_load import new_load
-from cable.moving_end.state import NOW, Line, new_line
+from cable.moving_end.segment_load import Load, new_load
+from cable.moving_end.state import NEW, NOW, Line, new_line
 from cable.properties import CableProperties
+from cable.sea_bed import SeaBed
+from cable.sections import COLUMNS, AnyCable, SectionedCable, check_length
 from cable.task import current_of
 from cable.winch import Brake
 from subzero.arguments import checked_arguments
@@ -32,6 +37,17 @@ RESCALINGS = 3
 """How often the unit of force is corrected where the first guess of the tension was far off."""
 WEIGHTLESS = 1e-9
 """A cable with less tension than this has no load at all. [N]"""
+ON_BED = 1e-4
+"""An end that is nearer to the bed than this share of the length lies on it. [-]"""
+STIFFER = 4.0
+"""By so much the bed gets stiffer from search to search (`_sink_onto`). [-]"""
+ROUGHENINGS, SETTLED = 20, 1e-7
+"""How often friction is taken again from the tension that it leaves, until it changes by less than this share."""
+FORCES = frozenset(
+    {"mass", "added_mass", "weight", "retardation", "tangential_drag", "normal_drag", "bending_stiffness"}
+    | {"bed_stiffness", "bed_damping"}
+)
+"""Numbers of a cable that forces are proportional to."""
 TAUT = 1.0 - 1e-9
 """If the ends of an unstretchable cable are this share of its length apart, weight does not determine its tension."""
 
@@ -46,9 +62,10 @@ def hold(
     length: float,
     current: Place | Current | None = None,
     *,
-    cable: CableProperties | None = None,
+    cable: AnyCable | None = None,
     segment_length: float | None = None,
     start: Place | None = None,
+    bed: SeaBed | None = None,
 ) -> Equilibrium:
     """Return the equilibrium of a cable that is held at two ends.
 
@@ -61,6 +78,10 @@ def hold(
     `start` chooses. A neutral cable in still water that is longer than the way has no shape: it is laid straight,
     without force, and all of it is `slack_length`.
 
+    On a sea bed it lies as far as it is longer than what hangs. Where the second end is on the bed, the cable is taken
+    to have been laid from there and tightened: friction along it then pulls towards that end, fully as far as there is
+    tension. Else nothing says which way it would have slid, and there is no friction.
+
     Args:
         ends: where it is held (2, 3): the vehicle or first end, then the drum or second end. [m]
         length: unstretched length between them. [m]
@@ -69,20 +90,25 @@ def hold(
         cable: the cable; Table 1 of the source when not given.
         segment_length: Δs; a hundredth of the length when not given. [m]
         start: node positions (any number, 3) to start the search from; a catenary under weight and drag when not given.
+        bed: the sea bed, in the axes of `ends`; none when not given.
 
     Raises:
         HoldError: ends, length or segments that make no sense; an unstretchable cable that is too short; no
             equilibrium found.
+        subzero.UserError: an end below the bed.
     """
     cable, water = CableProperties() if cable is None else cable, current_of(current)
     places = _checked_ends(ends)
     length = _checked_length(places, length, cable)
-    line = _between(places, length, _segments(length, segment_length))
+    line = _between(places, length, _divided(cable, length, segment_length))
+    if bed is not None:
+        bed.refuse_below(places, "hold")
     starts = [None] if start is None else [_checked_start(start, places), None]
     for nodes in starts:
-        steps, scale = _search(line, nodes, water.numbers(places[1]), cable)
+        steps, scale = _search(line, nodes, water.numbers(places[1]), cable, bed)
         if steps > 0:
             found = _found(line, places, length, cable, water, steps, scale)
+            found = found if bed is None else replace(found, bed=bed, bed_friction=_friction(line))
             _check_bends(found)
             return found
     message = (
@@ -93,17 +119,62 @@ def hold(
     raise HoldError(message)
 
 
-def _search(line: Line, nodes: np.ndarray | None, water: Water, cable: CableProperties) -> tuple[int, float]:
+def _search(
+    line: Line, nodes: np.ndarray | None, water: Water, cable: AnyCable, bed: SeaBed | None
+) -> tuple[int, float]:
     """Bring a line to rest from node positions, or from a catenary; return steps (−1: none) and the unit of force."""
-    c, work, brake = cable.numbers(), new_load(), Brake().numbers()
+    c, work, brake = _at_rest_on(bed, cable), new_load(), Brake().numbers()
     brake.setpoint = line.ends.settled + line.ends.last_length[NOW]
     scale = hang(line, water, c, work)
     if nodes is not None:
         _lay_along(line, nodes)
+    if bed is None:
+        return _come_to_rest(line, water, c, brake, work, scale)
+    return _sink_onto(bed, line, water, c, brake, work, scale)
+
+
+def _sink_onto(
+    bed: SeaBed, line: Line, water: Water, c: Any, brake: DrumNumbers, work: Load, scale: float
+) -> tuple[int, float]:
+    """Bring a line to rest on a bed that gets stiffer from search to search, and then rougher.
+
+    Into soft ground, a cable that hangs far below the bed sinks; so each shape is near the next.
+    """
+    hard, nodes = float(c.bed_stiffness), int(line.ends.count) + 1
+    is_laid = -bed.below(line.ends.origin)[0] < max(c.bed_rounding, ON_BED * line.length[1] * nodes)
+    rough = bed.axial_friction if is_laid else 0.0
+    deepest = float(bed.below(line.position[NOW, :nodes] + np.asarray(line.ends.origin)).max())
+    soft = min(max(abs(c.weight), WEIGHTLESS) / max(deepest, c.bed_rounding), hard)
+    stiff = c.section[:, -2].copy() if "section" in c.names else 0.0
+    stages = int(np.ceil(np.log(hard / soft) / np.log(STIFFER)))
+    for k, c.bed_stiffness in enumerate(hard * STIFFER ** -np.arange(stages, -1.0, -1.0)):
+        line.tension[:] *= scale if k > 0 else 1.0
+        if "section" in c.names:
+            c.section[:, -2] = stiff * c.bed_stiffness / hard
+        steps, scale = _come_to_rest(line, water, c, brake, work, scale)
+        if steps < 0:
+            return steps, scale
+    for _ in range(ROUGHENINGS if rough > 0.0 else 0):
+        line.tension[:] *= scale
+        before = line.friction[NOW].copy()
+        line.friction[NOW, :nodes] = friction_at_rest(line, c, rough)
+        if np.abs(line.friction[NOW] - before).max() <= SETTLED * rough:
+            line.tension[:] /= scale
+            break
+        steps, scale = _come_to_rest(line, water, c, brake, work, scale)
+        if steps < 0:
+            break
+    return steps, scale
+
+
+def _come_to_rest(
+    line: Line, water: Water, c: Any, brake: DrumNumbers, work: Load, scale: float
+) -> tuple[int, float]:
+    """Bring a line to rest from where it is, its tensions in newtons; return steps (−1: none) and the unit of force."""
     for _ in range(RESCALINGS):
         scale = scale if scale > WEIGHTLESS else 1.0
         line.tension[:] /= scale
-        steps = relax(line, water, _in_units_of(scale, cable), brake, work)
+        steps = relax(line, water, _in_units_of(scale, c), brake, work)
         largest = float(line.tension[NOW].max())
         if steps < 0 or largest * scale < WEIGHTLESS or 0.01 < largest < 100.0:
             break
@@ -112,11 +183,31 @@ def _search(line: Line, nodes: np.ndarray | None, water: Water, cable: CableProp
     return steps, scale
 
 
-def _in_units_of(scale: float, cable: CableProperties) -> Any:
-    """Return the cable's numbers for forces in units of `scale` newtons."""
-    c = cable.numbers()
+def _at_rest_on(bed: SeaBed | None, cable: AnyCable) -> Any:
+    """Return the cable's numbers for a search for rest."""
+    c: Any = cable.numbers(bed)
+    if bed is not None:
+        c.is_at_rest = True
+    return c
+
+
+def _friction(line: Line) -> np.ndarray:
+    """Return the bed's friction on the nodes, as a share of its pressure (nodes, 3). [-]"""
+    friction: np.ndarray = line.friction[NEW, : line.ends.count + 1].copy()
+    return friction
+
+
+def _in_units_of(scale: float, c: Any) -> Any:
+    """Return a cable's numbers for forces in units of `scale` newtons."""
+    c = c.copy()
     for name in c.names:
-        c[name] = c[name] * scale if name == "compliance" else c[name] / scale
+        if name in FORCES:
+            c[name] = c[name] / scale
+        elif name in ("section", "body"):
+            c[name] /= scale
+    c.compliance *= scale
+    if "section" in c.names:
+        c.section[:, COLUMNS.index("compliance")] *= scale * scale
     return c
 
 
@@ -157,7 +248,7 @@ def _positive(name: str, given: object) -> float:
     return length
 
 
-def _checked_length(places: np.ndarray, given: float, cable: CableProperties) -> float:
+def _checked_length(places: np.ndarray, given: float, cable: AnyCable) -> float:
     """Return the length; raise an error if no cable of that length reaches, or if it is not a length. [m]."""
     length = _positive("length", given)
     apart = float(np.linalg.norm(places[0] - places[1]))
@@ -205,14 +296,25 @@ def _checked_start(start: Place, places: np.ndarray) -> np.ndarray:
     return from_second_end
 
 
-def _between(places: np.ndarray, length: float, count: int) -> Line:
-    """Return a line of even segments, with its ends where they are held."""
+def _divided(cable: AnyCable, length: float, segment_length: float | None) -> np.ndarray:
+    """Return the lengths of segments: even, but between ends of sections and bodies. [m]."""
+    count = _segments(length, segment_length)
+    if isinstance(cable, SectionedCable):
+        check_length(cable, length)
+        return cable.divided(length / count)
+    return np.full(count, length / count)
+
+
+def _between(places: np.ndarray, length: float, lengths: np.ndarray) -> Line:
+    """Return a line of segments (n,) [m], with its ends where they are held."""
+    count = lengths.size
     line = new_line(count)
     line.ends.count = count
-    line.length[1 : count + 1] = line.ends.layout.segment_length = length / count
-    line.ends.last_length[:] = length / count
-    line.ends.settled = length - length / count
+    line.length[1 : count + 1] = lengths
+    line.ends.layout.segment_length = line.ends.last_length[:] = lengths[-1]
+    line.ends.settled = length - lengths[-1]
     line.position[:, 0] = places[0] - places[1]
+    line.ends.origin[:] = places[1]
     return line
 
 
@@ -228,7 +330,7 @@ def _found(
     line: Line,
     places: np.ndarray,
     length: float,
-    cable: CableProperties,
+    cable: AnyCable,
     current: Current,
     steps: int,
     scale: float,

@@ -7,9 +7,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from math import isfinite, sqrt
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from subzero.errors import BadValueError, checked
 from subzero.jit import Record
+
+if TYPE_CHECKING:
+    from cable.sea_bed import SeaBed
 
 GRAVITY = 9.81
 """Gravitational acceleration g, as printed in section 2.2 of the source. [m/s²]"""
@@ -33,6 +39,49 @@ class StiffCableNumbers(CableNumbers):
     bending_stiffness: float
 
 
+class LaidCableNumbers(CableNumbers):
+    """The same of a cable above a sea bed: its plane, k, c, δ, μ and κ, see `cable.sea_bed`."""
+
+    bed_normal: np.ndarray
+    bed_level: float
+    bed_stiffness: float
+    bed_damping: float
+    bed_rounding: float
+    axial_friction: float
+    lateral_friction: float
+    friction_rate: float
+    is_at_rest: bool
+
+
+class SectionedCableNumbers(LaidCableNumbers):
+    """The same of a line of sections and bodies: always of one section, and all of them, see `cable.sections`.
+
+    Attributes:
+        section: numbers of each (sections, 9), `sections.COLUMNS`, then k and c of the bed.
+        section_end: where each ends, from the tow point; the last is endless (sections,). [m]
+        section_now, section_segment, section_along: the section that the record describes, of which segment, and
+            where that ends. [-], [-], [m]
+        body: m, ρC_aV, weight in water, ½ρC_dA, ½ρC_LA of each body (bodies, 5).
+        body_place: distance from the tow point (bodies,). [m]
+        body_count: how many there are.
+    """
+
+    section: np.ndarray
+    section_end: np.ndarray
+    section_now: int
+    section_segment: int
+    section_along: float
+    body: np.ndarray
+    body_place: np.ndarray
+    body_count: int
+
+
+class StiffLaidCableNumbers(LaidCableNumbers):
+    """The same of a cable that resists bending, with EI [N m²]."""
+
+    bending_stiffness: float
+
+
 ABOVE_ZERO = ("water_density", "mass_per_length", "cross_section_area", "diameter")
 """Without these it is no cable; everything else may be zero."""
 
@@ -48,6 +97,7 @@ class CableProperties:
         diameter: d. [m]
         tangential_drag_coefficient: C_t, on the wetted surface π d. [-]
         normal_drag_coefficient: C_n, on the projected area d. [-]
+        added_mass_coefficient: C_a, added mass across the cable as a share of ρA; 1 for a round cylinder. [-]
         compliance: e = 1/(E A); 0 is an inextensible cable. [1/N]
         internal_damping: B, of stretch, T = E A ε + B dε/dt; see `moving_end.slack_law`. [N s]
         bending_stiffness: E I; see `moving_end.bending`. [N m²]
@@ -64,6 +114,7 @@ class CableProperties:
     diameter: float = 0.0025
     tangential_drag_coefficient: float = 0.01
     normal_drag_coefficient: float = 1.0
+    added_mass_coefficient: float = 1.0
     compliance: float = 0.0
     internal_damping: float = 0.0
     bending_stiffness: float = 0.0
@@ -85,8 +136,10 @@ class CableProperties:
 
     @property
     def virtual_mass_per_length(self) -> float:
-        """m1 = m + ρA. [kg/m]."""
-        return self.mass_per_length + self.water_density * self.cross_section_area
+        """m1 = m + C_a ρA. [kg/m]."""
+        return (
+            self.mass_per_length + self.added_mass_coefficient * self.water_density * self.cross_section_area
+        )
 
     @property
     def weight_in_water(self) -> float:
@@ -111,11 +164,11 @@ class CableProperties:
         ratio = abs(self.weight_in_water) / (2.0 * self.normal_drag * speed * speed)
         return acos(sqrt(1.0 + ratio * ratio) - ratio)
 
-    def numbers(self) -> CableNumbers:
-        """Return the plain numbers that compiled code takes: `CableNumbers` or `StiffCableNumbers`."""
-        values = {
+    def numbers(self, bed: SeaBed | None = None) -> CableNumbers:
+        """Return the plain numbers that compiled code takes, of a cable that may bend, above a bed if there is one."""
+        values: dict[str, Any] = {
             "mass": self.mass_per_length,
-            "added_mass": self.water_density * self.cross_section_area,
+            "added_mass": self.added_mass_coefficient * self.water_density * self.cross_section_area,
             "weight": self.weight_in_water,
             "compliance": self.compliance,
             "retardation": self.internal_damping * self.compliance,
@@ -127,5 +180,15 @@ class CableProperties:
                 "CableProperties: its numbers are so large that masses, weights or drags are not finite."
             )
         if self.bending_stiffness > 0.0:
-            return StiffCableNumbers(**values, bending_stiffness=self.bending_stiffness)
-        return CableNumbers(**values)
+            values["bending_stiffness"] = self.bending_stiffness
+        kind = KINDS[self.bending_stiffness > 0.0, bed is not None]
+        return kind(**values | (bed.numbers(self) if bed is not None else {}))
+
+
+KINDS: dict[tuple[bool, bool], type[CableNumbers]] = {
+    (False, False): CableNumbers,
+    (True, False): StiffCableNumbers,
+    (False, True): LaidCableNumbers,
+    (True, True): StiffLaidCableNumbers,
+}
+"""Whether a cable resists bending, and whether there is a bed → its numbers."""

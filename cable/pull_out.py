@@ -15,9 +15,20 @@ import numpy as np
 from cable.current import Current
 from cable.history import Equilibrium, History
 from cable.moving_end import time_loop
-from cable.properties import CableProperties
 from cable.schemes import Equation7, Lumped, MovingEnd, Options, Paper
-from cable.task import EQUILIBRIUM, EVERYTHING, INTERNAL_DAMPING, Drum, MovingDrum, PullOut, Tow
+from cable.sea_bed import SeaBed
+from cable.sections import AnyCable
+from cable.task import (
+    EQUILIBRIUM,
+    EVERYTHING,
+    INTERNAL_DAMPING,
+    SEA_BED,
+    SECTIONS,
+    Drum,
+    MovingDrum,
+    PullOut,
+    Tow,
+)
 from cable.tow_path import Velocity
 from subzero.arguments import checked_arguments
 from subzero.errors import BadValueError, short, suggestion
@@ -65,7 +76,12 @@ SCHEMES: Mapping[str, Scheme] = {
     "paper_tangent": Scheme(Paper(reading="tangent"), _in_angles, None, PLAIN),
     "paper_drum": Scheme(Paper(reading="drum"), _in_angles, None, PLAIN),
     "equation7": Scheme(Equation7(), _in_angles, None, PLAIN),
-    "lumped": Scheme(Lumped(), _lumped_pull_out, _lumped_tow, EVERYTHING - {EQUILIBRIUM, INTERNAL_DAMPING}),
+    "lumped": Scheme(
+        Lumped(),
+        _lumped_pull_out,
+        _lumped_tow,
+        EVERYTHING - {EQUILIBRIUM, INTERNAL_DAMPING, SEA_BED, SECTIONS},
+    ),
 }
 """Name → the scheme; the first is the default, and "paper" the usable reading of the paper's."""
 
@@ -75,10 +91,11 @@ def pull_out(
     tow_velocity: Velocity,
     duration: float,
     *,
-    cable: CableProperties | None = None,
+    cable: AnyCable | None = None,
     drum: Drum | MovingDrum | None = None,
     current: Sequence[float] | np.ndarray | Current | None = None,
     start: float | Equilibrium = 0.0,
+    bed: SeaBed | None = None,
     scheme: str | Options = "moving_end",
 ) -> History:
     """Pull a cable off a drum, starting with the tow point at the drum unless `start` says otherwise.
@@ -100,7 +117,8 @@ def pull_out(
             time (places relative to the drum at the start); still water when not given.
         start: length of cable in the water at the start, laid straight behind the tow point [m]; or a cable that hangs
             or streams between vehicle and drum, from `cable.hold`: the run begins with it, its cable and its current
-            (unless others are given), its length and its segments.
+            (unless others are given), its length, its segments and its bed.
+        bed: the sea bed, in the axes of the current; none when not given.
         scheme: how it is computed: `cable.MovingEnd` (the default), `cable.Lumped`, `cable.Equation7` or `cable.Paper`,
             each with its options, or a name of `cable.SCHEMES` for one as it is by default.
 
@@ -113,7 +131,7 @@ def pull_out(
             (Bad values are a ValueError, too.)
     """
     row, options = _chosen(scheme)
-    task = PullOut.of(tow_velocity, duration, cable=cable, drum=drum, current=current, start=start)
+    task = PullOut.of(tow_velocity, duration, cable=cable, drum=drum, current=current, start=start, bed=bed)
     missing = [what for what in task.asks_for() if what not in row.knows]
     if missing:
         able = [repr(name) for name, other in SCHEMES.items() if set(task.asks_for()) <= other.knows]
@@ -129,9 +147,10 @@ def tow(
     length: float,
     duration: float,
     *,
-    cable: CableProperties | None = None,
+    cable: AnyCable | None = None,
     current: Sequence[float] | np.ndarray | Current | None = None,
     drogue_drag_area: float = 0.0,
+    bed: SeaBed | None = None,
     scheme: str | Options = "moving_end",
 ) -> History:
     """Tow a cable of fixed length, starting from the exact steady straight tow.
@@ -147,6 +166,8 @@ def tow(
         current: velocity of the water north, east, down (3,) [m/s], or a `cable.Current` that changes with place and
             time (places relative to the tow point at the start); still water when not given.
         drogue_drag_area: C_d A of a drogue at the free end; 0 is a free tail. [m²]
+        bed: the sea bed, at places relative to the tow point at the start; none when not given. What would begin
+            below it trails on it.
         scheme: as in `cable.pull_out`; the paper's cannot tow a free end.
 
     Returns:
@@ -162,8 +183,16 @@ def tow(
         able = " or ".join(repr(name) for name, other in SCHEMES.items() if other.tow)
         raise BadValueError(f"scheme '{options.name}' cannot tow a free end; choose {able}.")
     task = Tow.of(
-        tow_velocity, length, duration, cable=cable, current=current, drogue_drag_area=drogue_drag_area
+        tow_velocity,
+        length,
+        duration,
+        cable=cable,
+        current=current,
+        drogue_drag_area=drogue_drag_area,
+        bed=bed,
     )
+    if bed is not None and SEA_BED not in row.knows:
+        raise BadValueError(f"scheme '{options.name}' does not know {SEA_BED}; use 'moving_end'.")
     return row.tow(task, options)
 
 

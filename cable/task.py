@@ -16,10 +16,12 @@ from cable.drum import DrumProperties
 from cable.history import Equilibrium
 from cable.properties import CableProperties
 from cable.schemes import SHORTEST_S
+from cable.sea_bed import SeaBed
+from cable.sections import AnyCable, SectionedCable
 from cable.tow_path import Velocity
 from cable.winch import Winch
 from subzero.arguments import checked_arguments
-from subzero.errors import checked
+from subzero.errors import BadValueError, checked
 
 Drum = DrumProperties | Winch
 START_LENGTH = 1e-6
@@ -28,7 +30,11 @@ START_LENGTH = 1e-6
 WINCH, MOVING_DRUM, UNEVEN_CURRENT = "a winch", "a drum that moves", "a current that changes"
 WET_LENGTH, EQUILIBRIUM = "cable in the water at the start", "a start from cable.hold"
 INTERNAL_DAMPING = "internal damping of the cable"
-EVERYTHING = frozenset({WINCH, MOVING_DRUM, UNEVEN_CURRENT, WET_LENGTH, EQUILIBRIUM, INTERNAL_DAMPING})
+SEA_BED = "a sea bed"
+SECTIONS = "a cable of several sections"
+EVERYTHING = frozenset(
+    {WINCH, MOVING_DRUM, UNEVEN_CURRENT, WET_LENGTH, EQUILIBRIUM, INTERNAL_DAMPING, SEA_BED, SECTIONS}
+)
 """Features that a task may ask for beyond a free drum on the shore, uniform water and no cable at the start."""
 
 
@@ -59,16 +65,18 @@ class PullOut:
         current: how the water moves.
         start: length of cable in the water at the start, laid straight behind the tow point [m]; or how it hangs.
         origin: place of the drum at the start, in the axes of the current (3,). [m]
+        bed: the sea bed, in the axes of the current; None without.
     """
 
     tow_velocity: Velocity
     duration: float
-    cable: CableProperties
+    cable: AnyCable
     drum: Drum
     drum_velocity: Velocity | None
     current: Current
     start: float | Equilibrium
     origin: np.ndarray
+    bed: SeaBed | None
 
     @classmethod
     def of(
@@ -76,10 +84,11 @@ class PullOut:
         tow_velocity: Velocity,
         duration: float,
         *,
-        cable: CableProperties | None = None,
+        cable: AnyCable | None = None,
         drum: Drum | MovingDrum | None = None,
         current: Sequence[float] | np.ndarray | Current | None = None,
         start: float | Equilibrium = 0.0,
+        bed: SeaBed | None = None,
     ) -> PullOut:
         """Return the task of `cable.pull_out`, with defaults filled in.
 
@@ -90,6 +99,7 @@ class PullOut:
         if isinstance(start, Equilibrium):
             cable = start.cable if cable is None else cable
             origin, current = (start.shape[-1], start.current) if current is None else (origin, current)
+            bed = start.bed if bed is None else bed
         else:
             start = checked("", "start", start, least=0.0, unit="m, or what cable.hold gives")
         cable, drum = _cable_of(cable), DrumProperties() if drum is None else drum
@@ -102,6 +112,7 @@ class PullOut:
             current=current_of(current),
             start=start,
             origin=origin,
+            bed=bed,
         )
 
     @property
@@ -118,6 +129,8 @@ class PullOut:
             WET_LENGTH: not isinstance(self.start, Equilibrium) and self.start > 0.0,
             EQUILIBRIUM: isinstance(self.start, Equilibrium),
             INTERNAL_DAMPING: self.cable.internal_damping > 0.0,
+            SEA_BED: self.bed is not None,
+            SECTIONS: isinstance(self.cable, SectionedCable),
         }
         return [what for what, is_asked in asked.items() if is_asked]
 
@@ -133,14 +146,16 @@ class Tow:
         cable: the cable.
         current: how the water moves, at places relative to the tow point at the start.
         drogue_drag_area: C_d A of a drogue at the free end; 0 is a free tail. [m²]
+        bed: the sea bed, at places relative to the tow point at the start; None without.
     """
 
     tow_velocity: Velocity
     length: float
     duration: float
-    cable: CableProperties
+    cable: AnyCable
     current: Current
     drogue_drag_area: float
+    bed: SeaBed | None
 
     @classmethod
     def of(
@@ -149,9 +164,10 @@ class Tow:
         length: float,
         duration: float,
         *,
-        cable: CableProperties | None = None,
+        cable: AnyCable | None = None,
         current: Sequence[float] | np.ndarray | Current | None = None,
         drogue_drag_area: float = 0.0,
+        bed: SeaBed | None = None,
     ) -> Tow:
         """Return the task of `cable.tow`, with defaults filled in.
 
@@ -165,6 +181,7 @@ class Tow:
             cable=_cable_of(cable),
             current=current_of(current),
             drogue_drag_area=checked("", "drogue_drag_area", drogue_drag_area, least=0.0),
+            bed=bed,
         )
 
     @property
@@ -185,6 +202,13 @@ def current_of(current: Sequence[float] | np.ndarray | Current | None) -> Curren
     return Current.uniform(np.zeros(3) if current is None else current)
 
 
-def _cable_of(cable: CableProperties | None) -> CableProperties:
+def uniform(cable: AnyCable) -> CableProperties:
+    """Return a cable that is one section, for a scheme that knows no others."""
+    if isinstance(cable, SectionedCable):
+        raise BadValueError(f"This scheme does not know {SECTIONS}; use 'moving_end'.")
+    return cable
+
+
+def _cable_of(cable: AnyCable | None) -> AnyCable:
     """Return the cable, that of Table 1 when none is given."""
     return CableProperties() if cable is None else cable

@@ -30,6 +30,7 @@ import numpy as np
 from cable.current import Current
 from cable.drum import LENGTH, DrumNumbers, DrumProperties
 from cable.drum_motion import PLACE, SETPOINT, VELOCITY
+from cable.history import Equilibrium
 from cable.hold import hold
 from cable.moving_end.energy import LOSS, STORED
 from cable.moving_end.host_step import (
@@ -49,11 +50,13 @@ from cable.moving_end.host_step import (
     laid,
     make_real,
 )
-from cable.moving_end.initial_shape import lay_held, straight_between, towed_from
+from cable.moving_end.initial_shape import lay_held, straight_between, towed_from, trail_on_bed
 from cable.moving_end.state import NOW, Line, enlarged, new_line
 from cable.moving_end.stops import Names, describe_bad_number, describe_jump, describe_reach, describe_stop
 from cable.properties import CableProperties
 from cable.schemes import COARSEST, FINEST, SHORTEST_S, TOLERANCE
+from cable.sea_bed import SeaBed
+from cable.sections import AnyCable
 from cable.task import START_LENGTH, Drum, current_of
 from cable.tow_path import segments_needed
 from cable.winch import SHORTEST, Brake, ConstantTension, PayOutRate
@@ -113,7 +116,7 @@ class Tether:
     @checked_arguments
     def __init__(
         self,
-        cable: CableProperties | None = None,
+        cable: AnyCable | None = None,
         *,
         ends: Sequence[Any] | np.ndarray,
         length: float | None = None,
@@ -123,6 +126,7 @@ class Tether:
         segments: int | None = None,
         segment_length: float | None = None,
         drogue_drag_area: float = 0.0,
+        bed: SeaBed | None = None,
         rtol: float = RTOL,
         atol: float = ATOL,
         tolerance: float = TOLERANCE,
@@ -142,6 +146,7 @@ class Tether:
             segments: how many; 50 when neither this nor `segment_length` is given.
             segment_length: how long they are, also those of cable that is paid out later. [m]
             drogue_drag_area: C_d A of a drogue at the free tail. [m²]
+            bed: the sea bed, in the axes of the ends; none when not given.
             rtol: error of the force that an inner step may make, as a share of the largest force so far; 0 takes the
                 steps of the host as they are.
             atol: an error that it may make in any case. [N]
@@ -168,21 +173,28 @@ class Tether:
             inf if longest is None else checked("Tether", "longest", longest, least=start, unit="m")
         )
         each = _segment_length(start, segments, segment_length)
-        drum = self._winch.numbers()
+        drum, c = self._winch.numbers(), self.cable.numbers(bed)
+        if bed is not None:
+            bed.refuse_below(states[:, 0], "Tether")
         if not two:
             tail_drag = (
                 0.5 * self.cable.water_density * checked("", "drogue_drag_area", drogue_drag_area, least=0.0)
             )
             J = self.current.at(states[0, 0])
             line, origin = towed_from(self.cable, states[0], start, each, J, tail_drag)
+            line.ends.origin[:] = origin
+            trail_on_bed(line, bed)
         elif abs(start - way) <= STRAIGHT * start or way <= START_LENGTH >= start:
-            line, origin = straight_between(states, start, each, drum, self.cable.numbers()), states[1, 0]
+            line, origin = straight_between(states, start, each, drum, c), states[1, 0]
         else:
             rate = _rate_at_start(self._winch)
-            line, origin = _at_rest(self.cable, states, start, each, self.current, drum, rate), states[1, 0]
+            passing = _passing(self.current, states, rate)
+            rest = hold(states[:, 0], start, passing, cable=self.cable, segment_length=each, bed=bed)
+            line, origin = _from_rest(rest, states, drum, rate), states[1, 0]
+        line.ends.origin[:] = origin
         line.ends.solver.tolerance = checked("Tether", "tolerance", tolerance, least=FINEST, most=COARSEST)
         water = self.current.numbers(origin)
-        self._take(laid(line, states, origin, drum, start, self.cable.numbers(), water))
+        self._take(laid(line, states, origin, drum, start, c, water))
         if self._rtol > 0.0:
             self._line.ends.tow.largest = atol / self._rtol  # errors are shares of it
         begin(self._held)
@@ -539,24 +551,19 @@ def _towards(places: np.ndarray) -> np.ndarray:
     return direction
 
 
-def _at_rest(
-    cable: CableProperties,
-    states: np.ndarray,
-    length: float,
-    each: float,
-    current: Current,
-    drum: DrumNumbers,
-    rate: float,
-) -> Line:
-    """Return a line that hangs or streams between its ends as if it went on at its mean velocity.
+def _passing(current: Current, states: np.ndarray, rate: float) -> Current:
+    """Return the current that a tether which goes on at its mean velocity sees."""
+    first, second = states[:, 1]
+    moving = 0.5 * (first + second + rate * _towards(states[:, 0]))
+    return replace(current, velocity=current.velocity - moving) if moving.any() else current
+
+
+def _from_rest(rest: Equilibrium, states: np.ndarray, drum: DrumNumbers, rate: float) -> Line:
+    """Return a line that hangs or streams between its ends (`_passing`).
 
     A winch that pays out from the start on at `rate` [m/s] feeds cable that moves along itself already.
     """
     first, second = states[:, 1]
-    fed = second + rate * _towards(states[:, 0])
-    moving = 0.5 * (first + fed)
-    passing = replace(current, velocity=current.velocity - moving) if moving.any() else current
-    rest = hold(states[:, 0], length, passing, cable=cable, segment_length=each)
     line = new_line(rest.segment_lengths.size + SPARE)
     line.ends.layout.segment_length = float(rest.segment_lengths[0])
     drum.velocity[:] = states[1, 1]

@@ -117,7 +117,7 @@ current_down_m_s  | m/s | -5 | 5 | 0 | velocity of the water downwards
 """)
 
 BED = _read("""
-sea_bed_m | m | 0 | 11000 | 0 | depth of a flat sea bed, positive down; 0: not known
+sea_bed_m | m | 0 | 11000 | 0 | depth of a flat sea bed that the cable lies on, positive down; 0: none
 """)
 
 PROFILE = _read(

@@ -22,7 +22,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 import scenarios
-from cable import CableProperties, DrumProperties
+from cable import CableProperties, DrumProperties, SeaBed
 from cable.current import Current
 from subzero.arguments import checked_arguments
 from subzero.errors import BadValueError, short, suggestion
@@ -46,6 +46,7 @@ class Model:
         winch: the winch that turns the drum; None for a free drum.
         vessel: how the drum moves; None for a drum on the shore.
         missing: a force that all of these lack; None for nothing.
+        sea_bed: depth of a flat sea bed that the cable may lie on; 0 for none. [m]
     """
 
     vehicle: Vehicle
@@ -56,6 +57,7 @@ class Model:
     winch: scenarios.Winch | None = None
     vessel: scenarios.Vessel | None = None
     missing: MissingForce | None = None
+    sea_bed: float = 0.0
 
     def __post_init__(self) -> None:
         """Keep the current as plain numbers."""
@@ -77,6 +79,7 @@ class Model:
             profile=trial.profile,
             winch=trial.winch,
             vessel=trial.vessel,
+            sea_bed=trial.sea_bed,
         )
 
     def parameters(self) -> dict[str, Any]:
@@ -89,6 +92,11 @@ class Model:
             **{name: _plain(getattr(self, name)) for name in ("profile", "winch", "vessel")},
             **({"missing": _plain(self.missing)} if self.missing else {}),
         }
+
+    @property
+    def bed(self) -> SeaBed | None:
+        """The sea bed that the cable may lie on."""
+        return SeaBed(depth=self.sea_bed) if self.sea_bed > 0.0 else None
 
     def water(self) -> Current:
         """Return the motion of the water: the uniform current, and the profile that is added to it by depth."""

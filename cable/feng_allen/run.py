@@ -37,7 +37,7 @@ from cable.feng_allen.equation7 import Equation7Numbers, equation7_numbers, tang
 from cable.feng_allen.printed_scheme import paper_step
 from cable.history import History, Outcome
 from cable.schemes import Equation7, Paper
-from cable.task import PullOut
+from cable.task import PullOut, uniform
 from cable.tow_path import Velocity, sample_path
 from subzero.errors import BadValueError, real, short
 
@@ -79,7 +79,7 @@ def pull_out_paper(task: PullOut, scheme: Paper) -> BoxHistory:
         the history; a run that cannot go on is cut short and says so in `message`.
     """
     assert isinstance(task.drum, DrumProperties), "the table of schemes lets no winch through"
-    c, drum = equation7_numbers(task.cable, _uniform(task)), task.drum.numbers()
+    c, drum = equation7_numbers(uniform(task.cable), _uniform(task)), task.drum.numbers()
     wound = 1.0 / task.drum.radius if scheme.reading == "drum" else 0.0
     steps, step = _steps(task.duration, scheme.time_step)
     w, record = box_workspace(steps + 2), BoxRecord(compliance=c.e)
@@ -116,7 +116,7 @@ def pull_out_boxes(task: PullOut, scheme: Equation7) -> BoxHistory:
     Returns:
         the history; a run that cannot go on is cut short and says so in `message`.
     """
-    c = equation7_numbers(task.cable, _uniform(task), stretch_momentum=0.0)
+    c = equation7_numbers(uniform(task.cable), _uniform(task), stretch_momentum=0.0)
     fixed, record = Fixed(scheme.segment_length, c, task.drum.numbers()), BoxRecord(compliance=c.e)
     steps, step = _steps(task.duration, scheme.time_step)
     b = moving_boxes(64)

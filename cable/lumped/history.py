@@ -19,7 +19,7 @@ from cable.lumped.start import held_at_drum, lay, steady_direction, steady_tensi
 from cable.lumped.step import GAMMA, START_OF_LEG, StageSolved, begin, take_step
 from cable.properties import CableNumbers, CableProperties
 from cable.schemes import Lumped
-from cable.task import PullOut, Tow
+from cable.task import PullOut, Tow, uniform
 from cable.tow_path import first_direction, sample_path, segments_needed
 from cable.winch import Brake, PayOutRate, Winch
 
@@ -39,8 +39,10 @@ def pull_out(task: PullOut, scheme: Lumped) -> History:
     tow_place += wet * ahead
     setpoint, rate = winch_rows(task.drum, times, wet)
     course = Course(times, np.c_[tow_place, place, setpoint], np.c_[velocity, speed, rate])
-    rope = rope_off_drum(course, segment_length, task.cable, task.drum, task.current.fastest, wet, ahead)
-    fixed = Fixed(task.cable.numbers(), task.drum.numbers(), task.current.numbers(), segment_length)
+    rope = rope_off_drum(
+        course, segment_length, uniform(task.cable), task.drum, task.current.fastest, wet, ahead
+    )
+    fixed = Fixed(uniform(task.cable).numbers(), task.drum.numbers(), task.current.numbers(), segment_length)
     return _run(rope, course, fixed)
 
 
@@ -50,18 +52,18 @@ def tow(task: Tow, scheme: Lumped) -> History:
     count = max(1, int(np.ceil(task.length / scheme.segment_length - 1e-9)))
     rope, lengths = new_rope(count), np.full(count, task.length / count)
     J, tail_drag = task.current.at((0.0, 0.0, 0.0), 0.0), task.tail_drag
-    ahead = steady_direction(velocity[0] - J, first_direction(velocity - J), task.cable, tail_drag)
+    ahead = steady_direction(velocity[0] - J, first_direction(velocity - J), uniform(task.cable), tail_drag)
     place += task.length * ahead
     still = np.zeros((times.size, 4))
     course = Course(times, np.c_[place, still], np.c_[velocity, still])
     tail = tail_drag * float(np.sum((velocity[0] - J) ** 2))
-    tensions = steady_tensions(velocity[0] - J, ahead, task.cable, lengths, tail)
-    lay(rope, task.cable, lengths, 0.5 * (tensions[1:] + tensions[:-1]), place[0], ahead)
+    tensions = steady_tensions(velocity[0] - J, ahead, uniform(task.cable), lengths, tail)
+    lay(rope, uniform(task.cable), lengths, 0.5 * (tensions[1:] + tensions[:-1]), place[0], ahead)
     rope.velocity[:, : count + 1] = velocity[0]
     rope.ends.free_end, rope.ends.tail_drag, rope.ends.drum_pull = True, tail_drag, tail
     rope.ends.tow_force[:] = -tensions[0] * ahead
     idle, water = DrumProperties().numbers(), task.current.numbers(-place[0])
-    return _run(rope, course, Fixed(task.cable.numbers(), idle, water, task.length / count))
+    return _run(rope, course, Fixed(uniform(task.cable).numbers(), idle, water, task.length / count))
 
 
 def rope_off_drum(

@@ -11,6 +11,7 @@ momentum, drag and weight of one segment                      segment_load, chor
 tension against stretch, and none when it is slack            slack_law
 backward differences of second order in time                  bdf2
 balance of every node, first and last                         assembly, bending
+what lies on the sea bed; sections and bodies                 contact, composition
 one step: Newton's method, and how the tow force answers      time_step, block_solver
 a step made real; a node more or less at the drum             remeshing
 a velocity that changes at once                               jolt
@@ -29,6 +30,7 @@ from cable.moving_end.energy import (
     LOSS,
     STORED,
     STRAINED,
+    TO_BED,
     TOWED,
     damping_loss,
     energy_flow,
@@ -53,6 +55,7 @@ __all__ = [
     "STORED",
     "STRAINED",
     "TOWED",
+    "TO_BED",
     "Line",
     "Load",
     "Names",

@@ -38,6 +38,8 @@ import numpy as np
 from cable.drum import FREE, STANDING, DrumNumbers
 from cable.moving_end.bdf2 import Weights
 from cable.moving_end.bending import add_bending
+from cable.moving_end.composition import add_bodies
+from cable.moving_end.contact import add_contact
 from cable.moving_end.drum_end import drum_row
 from cable.moving_end.segment_load import (
     Load,
@@ -57,6 +59,7 @@ from cable.moving_end.state import (
     UPPER,
     Line,
     held_node,
+    select_section,
 )
 from cable.properties import CableNumbers
 from subzero.jit import compiled, inlined, inner
@@ -106,6 +109,7 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
     ahead = measured_chord(line.position[NEW], 1, _length(line, 1))
     for j in range(1, N + 1):
         length, T = _length(line, j), line.tension[NEW, j]
+        select_section(line, c, j)
         work.square, work.chord_length, work.shorter = ahead
         by_strain = _length_equation(line, j, T, w, c, work.square, slopes)
         take_segment(line.position[NEW], line.velocity[NEW], line.water[NEW], j, work)
@@ -133,6 +137,8 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
             _scatter_length(line, j, length, by_strain, work)
     _keep_tow_force(line, slopes)
     add_bending(line, c)
+    add_contact(line, c, w, slopes)
+    add_bodies(line, c, w, slopes)
     if N > 1:
         _sharpen_tow_force(line)
     if line.ends.layout.free_end:

@@ -2,7 +2,7 @@
 
 Relative to the water, U = V − J, the balance of `segment_load` times U gives
 
-    −F·U(0) = dE/dt + L − G + D_S + M + C
+    −F·U(0) = dE/dt + L − G + D_S + M + C + B
 
 with F the force on the vehicle, E = ∫(½mU² + ½ρA U_⊥² + ½eT²) ds (and bending) the energy in the water, L = ∫D·U ds the
 loss to drag (and to internal damping; then ε⁺/e, the pull of the stretch alone, takes the place of T in E),
@@ -10,6 +10,7 @@ G = ∫w_c U_k ds the work of gravity, and
 
     D_S = −F_S·U(S) − (dS/dt) e(S)       work on the drum, F_S = T_N t_N + ½Q_N, less the energy that enters with new
                                          cable; at a free end, the loss of the drogue
+    B   = −Σ F_B·U                       what the sea bed takes: it is pressed in, damps, and rubs
     M   = −ρA ∫ U_t U_⊥·(∂t/∂t) ds       (the paper's added mass is no gradient of an energy when the cable turns)
     C   = ∫ m U·dJ/dt ds − ∫ T t·∂J/∂s ds    what a current that changes along the cable's way does; 0 in a uniform one
 
@@ -22,16 +23,18 @@ from __future__ import annotations
 import numpy as np
 
 from cable.moving_end.bending import bending_energy
+from cable.moving_end.composition import body_flow
+from cable.moving_end.contact import power_to_bed
 from cable.moving_end.segment_load import Load, evaluate_load, measured_chord, take_segment
 from cable.moving_end.slack_law import KNOWN
-from cable.moving_end.state import BEFORE, NOW, Line
+from cable.moving_end.state import BEFORE, NOW, Line, select_section
 from cable.properties import CableNumbers
 from subzero.jit import compiled, inlined, inner
 
-LOSS, STORED, GRAVITY_WORK, AT_DRUM, ADDED_MASS, STRAINED, CARRIED, TOWED, DAMPED = range(9)
+LOSS, STORED, GRAVITY_WORK, AT_DRUM, ADDED_MASS, STRAINED, CARRIED, TOWED, DAMPED, TO_BED = range(10)
 """Entries that `energy_flow` fills: L to drag, E [J], G, D_S, M, −∫T t·∂J/∂s ds, ∫m U·dJ/dt ds (mean over a step),
-−F·U(0), L to internal damping. [W]"""
-FLOWS = 9
+−F·U(0), L to internal damping, B. [W]"""
+FLOWS = 10
 
 
 @inner
@@ -42,6 +45,7 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
     for j in range(1, N + 1):
         length = line.ends.last_length[NOW] if j == N else line.length[j]
         T = line.tension[NOW, j]
+        select_section(line, c, j)
         take_segment(line.position[NOW], line.velocity[NOW], line.water[NOW], j, work)
         work.square, work.chord_length, work.shorter = measured_chord(line.position[NOW], j, length)
         evaluate_load(T, line.slip[j], line.normal_gain[j], 0.0, c, work)
@@ -62,9 +66,15 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
         sunk += length * c.weight * (V[2] - J[2])
         added -= c.added_mass * work.along * turn * length / work.chord_length
         carried += length * c.mass * _carried(line, j)
-    out[LOSS], out[STORED], out[GRAVITY_WORK], out[ADDED_MASS] = loss, energy, sunk, added
+    lost, held, fallen = body_flow(line, c)
+    out[LOSS], out[STORED], out[GRAVITY_WORK], out[ADDED_MASS] = (
+        loss + lost,
+        energy + held,
+        sunk + fallen,
+        added,
+    )
     out[STRAINED], out[CARRIED], out[AT_DRUM], out[TOWED] = strained, carried, 0.0, 0.0
-    out[DAMPED] = damped
+    out[DAMPED], out[TO_BED] = damped, power_to_bed(line, c)
     out[STORED] += bending_energy(line, c)
     _flow_at_ends(line, c, out)
 
@@ -148,7 +158,7 @@ def book_step(line: Line, step: float, c: CableNumbers, work: Load, ledger: np.n
     spent += half * (old[ADDED_MASS] + new[ADDED_MASS] + old[STRAINED] + new[STRAINED])
     spent += step * new[CARRIED] - half * (old[GRAVITY_WORK] + new[GRAVITY_WORK])
     damped = damping_loss(old, new, step)
-    spent += damped
+    spent += damped + half * (old[TO_BED] + new[TO_BED])
     towed = half * (old[TOWED] + new[TOWED])
     total[TOWED] += towed
     total[LOSS] += abs(towed) + half * (old[LOSS] + new[LOSS]) + damped

@@ -27,6 +27,7 @@ from cable.current import Water
 from cable.drum import DrumNumbers
 from cable.moving_end.bdf2 import Weights
 from cable.moving_end.chord_correction import correct_for_arc
+from cable.moving_end.composition import carried_weight
 from cable.moving_end.remeshing import fill_node_tensions
 from cable.moving_end.segment_load import Load, evaluate_load, measured_chord, segment_momentum, take_segment
 from cable.moving_end.slack_law import SMOOTHING, SOFTEST
@@ -36,6 +37,7 @@ from cable.moving_end.state import (
     NOW,
     Line,
     sample_water,
+    select_section,
 )
 from cable.moving_end.time_step import solve_step
 from cable.properties import CableNumbers
@@ -102,10 +104,12 @@ def hang(line: Line, water: Water, c: CableNumbers, work: Load) -> float:
             work.square, work.chord_length, work.shorter = measured_chord(
                 line.position[NEW], j, _length(line, j)
             )
+            select_section(line, c, j)
             evaluate_load(line.tension[NEW, j], 0.0, 1.0, 0.0, c, work)
             for i in range(3):
                 # Half of the change, so that shape and drag settle instead of alternating.
                 line.load[j, i] += 0.5 * (_length(line, j) * work.q[i] - line.load[j, i])
+            line.load[j, 2] -= 0.5 * carried_weight(line, c, j)
     _keep(line, c, work)
     for j in range(1, N + 1):
         largest = max(largest, line.tension[NOW, j])
@@ -116,12 +120,14 @@ def hang(line: Line, water: Water, c: CableNumbers, work: Load) -> float:
 def _load_across(line: Line, j: int, c: CableNumbers, work: Load) -> None:
     """Fill the load of segment j as if it stood square to the water."""
     take_segment(line.position[NEW], line.velocity[NEW], line.water[NEW], j, work)
+    select_section(line, c, j)
     J, square = work.water, 0.0
     for i in range(3):
         square += J[i] * J[i]
     for i in range(3):
         line.load[j, i] = -_length(line, j) * c.normal_drag * sqrt(square) * J[i]
     line.load[j, 2] -= _length(line, j) * c.weight
+    line.load[j, 2] -= carried_weight(line, c, j)
 
 
 @allocating

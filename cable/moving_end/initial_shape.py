@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from math import inf, sqrt
+from typing import Any
 
 import numpy as np
 
 from cable.current import Water
 from cable.drum import FREE, TURNING, DrumNumbers
 from cable.history import Equilibrium
+from cable.moving_end.composition import steady_tow
 from cable.moving_end.segment_load import Load, segment_momentum
 from cable.moving_end.state import (
     BEFORE,
@@ -21,7 +23,9 @@ from cable.moving_end.state import (
     sample_water,
     spacing,
 )
-from cable.properties import CableNumbers, CableProperties
+from cable.properties import CableNumbers
+from cable.sea_bed import SeaBed
+from cable.sections import AnyCable, SectionedCable, check_length
 from cable.tow_path import first_direction, segments_needed
 from subzero.jit import compiled
 
@@ -116,6 +120,8 @@ def lay_held(line: Line, held: Equilibrium, tow: np.ndarray, drum: np.ndarray, p
     line.velocity[:, : N + 1] = tow + along[:, None] * (drum - tow)
     line.tension[:, 1 : N + 1], line.node_tension[: N + 1] = held.segment_tensions, held.tensions
     ends.tow.force[:], ends.drum_pull = held.tow_force, held.tensions[-1]
+    if held.bed is not None:
+        line.friction[:, : N + 1] = held.bed_friction
 
 
 @compiled
@@ -133,25 +139,34 @@ def start_in_water(line: Line, water: Water, c: CableNumbers, work: Load) -> Non
             segment_momentum(line, level, j, length, c, work)
 
 
-def steady_direction(
-    velocity: np.ndarray, J: np.ndarray, cable: CableProperties, tail_drag: float
-) -> np.ndarray:
+def steady_direction(velocity: np.ndarray, J: np.ndarray, cable: AnyCable, tail_drag: float) -> np.ndarray:
     """Return the direction from the tail to the tow point in a steady tow, a unit vector (3,)."""
     speed, weight = float(np.linalg.norm(velocity[0] - J)), cable.weight_in_water
     # A cable at rest in the water hangs straight down, or up if it is buoyant.
     if speed == 0.0 and weight != 0.0:
         return np.array([0.0, 0.0, -np.sign(weight)])
     ahead = first_direction(velocity - J)
-    if weight == 0.0 or tail_drag > 0.0 or speed == 0.0 or abs(ahead[2]) > 1e-9:
+    if (
+        isinstance(cable, SectionedCable)
+        or weight == 0.0
+        or tail_drag > 0.0
+        or speed == 0.0
+        or abs(ahead[2]) > 1e-9
+    ):
         return ahead
     phi = cable.critical_angle(speed)
     return np.cos(phi) * ahead + np.array([0.0, 0.0, -np.sign(weight) * np.sin(phi)])
 
 
 def set_steady_tow(
-    line: Line, velocity: np.ndarray, J: np.ndarray, cable: CableProperties, tail_drag: float
+    line: Line, velocity: np.ndarray, J: np.ndarray, cable: AnyCable, tail_drag: float, each: float
 ) -> None:
-    """Give every node the tow point's velocity, and the segments tension and stretch of a steady straight tow."""
+    """Give every node the tow point's velocity, and the segments tension and stretch of a steady tow: a straight one,
+    but for a line of sections.
+    """
+    if isinstance(cable, SectionedCable):
+        _set_steady_sections(line, velocity, J, cable, tail_drag, each)
+        return
     N, U = line.ends.count, velocity - J
     t = -line.position[NOW, 0] / np.linalg.norm(line.position[NOW, 0])
     drag, weight = cable.tangential_drag * abs(U @ t) * -(U @ t), cable.weight_in_water * t[2]
@@ -168,6 +183,46 @@ def set_steady_tow(
     behind = np.cumsum(chords[::-1])[::-1]
     line.position[:, :N] = line.position[NOW, N] - behind[:, None] * t
     line.ends.tow.force[:], line.ends.drum_pull = pulls[-1] * t, pulls[0]
+
+
+def _set_steady_sections(
+    line: Line, velocity: np.ndarray, J: np.ndarray, cable: SectionedCable, tail_drag: float, each: float
+) -> None:
+    """Divide a line into segments at the ends of its sections and at its bodies, and lay it in a steady tow."""
+    lengths = cable.divided(each)
+    N = line.ends.count = lengths.size
+    line.length[1 : N + 1] = lengths
+    line.ends.last_length[:], line.ends.settled = lengths[-1], lengths[:-1].sum()
+    line.ends.payout[:] = 0.0
+    line.velocity[:, : N + 1] = velocity
+    c: Any = cable.numbers()
+    steady_tow(line, c, velocity - J, tail_drag)
+
+
+def division(cable: AnyCable, length: float, each: float) -> int:
+    """Return how many segments of about `each` [m] a cable of fixed length is divided into."""
+    if isinstance(cable, SectionedCable):
+        check_length(cable, length)
+        return int(cable.divided(each).size)
+    return max(1, int(np.ceil(length / each - 1e-9)))
+
+
+def trail_on_bed(line: Line, bed: SeaBed | None) -> None:
+    """Lay what would begin below the bed on it, in the direction in which it would have gone."""
+    N, x, origin = line.ends.count, line.position[NOW], np.asarray(line.ends.origin)
+    if bed is None or bed.below(x[: N + 1] + origin).max() <= 0.0:
+        return
+    chords, away, n = np.diff(x[: N + 1], axis=0), x[N] - x[0], bed.normal
+    away = away - (away @ n) * n
+    size = float(np.linalg.norm(away))
+    away = away / size if size > 0.0 else first_direction(np.zeros((1, 3)))
+    for j in range(1, N + 1):
+        chord = float(np.linalg.norm(chords[j - 1]))
+        x[j] = x[j - 1] + chords[j - 1]
+        if bed.below(x[j] + origin)[0] > 0.0:
+            down = min(max(-float(bed.below(x[j - 1] + origin)[0]), 0.0), chord)
+            x[j] = x[j - 1] + down * n + np.sqrt(chord * chord - down * down) * away
+    line.position[:, : N + 1] = x[: N + 1]
 
 
 def _grown(T: float, length: float, drag: float, weight: float, e: float) -> float:
@@ -192,14 +247,14 @@ def straight_between(
 
 
 def towed_from(
-    cable: CableProperties, state: np.ndarray, length: float, each: float, J: np.ndarray, tail_drag: float
+    cable: AnyCable, state: np.ndarray, length: float, each: float, J: np.ndarray, tail_drag: float
 ) -> tuple[Line, np.ndarray]:
     """Return a line that is towed steadily, and the place from which its places are counted: that of its tail."""
-    count = max(1, int(np.ceil(length / each - 1e-9)))
+    count = division(cable, length, each)
     line = new_line(count)
     line.ends.layout.segment_length = length / count
     uphill = steady_direction(state[1:], J, cable, tail_drag)
     lay_straight(line, length, uphill, state[1], DrumNumbers.at_rest(), cable.numbers())
     line.ends.layout.free_end, line.ends.layout.tail_drag = True, tail_drag
-    set_steady_tow(line, state[1], J, cable, tail_drag)
+    set_steady_tow(line, state[1], J, cable, tail_drag, each)
     return line, state[0] - line.position[NOW, 0]

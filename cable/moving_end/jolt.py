@@ -20,9 +20,10 @@ import numpy as np
 
 from cable.drum import LENGTH, SPINNING, STANDING, TENSION, DrumNumbers
 from cable.moving_end.block_solver import solve
+from cable.moving_end.composition import add_body_masses
 from cable.moving_end.segment_load import Load, segment_momentum
 from cable.moving_end.slack_law import chord_length, squared_share
-from cable.moving_end.state import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line
+from cable.moving_end.state import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line, select_section
 from cable.properties import CableNumbers
 from subzero.jit import allocating, inlined, inner
 
@@ -98,6 +99,7 @@ def _fill_tangents(line: Line, tangents: np.ndarray) -> None:
 def _mass(line: Line, tangents: np.ndarray, j: int, c: CableNumbers, out: np.ndarray) -> None:
     """Fill out (3, 3) with ∂P/∂V of segment j. [kg]."""
     length, t = _length(line, j), tangents[j]
+    select_section(line, c, j)
     for i in range(3):
         for k in range(3):
             out[i, k] = -length * c.added_mass * t[i] * t[k]
@@ -145,6 +147,7 @@ def _assemble(
                     if j < N:
                         U[j - 1, 1 + i, 1 + k] += quarter
     _assemble_drum(line, tangents, M, drum)
+    add_body_masses(line, c)
     # ΔV_0 is known: its column moves to the right-hand side.
     for m in range(4):
         for k in range(3):

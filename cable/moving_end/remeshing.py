@@ -11,6 +11,7 @@ from math import sqrt
 
 import numpy as np
 
+from cable.moving_end.contact import keep_friction
 from cable.moving_end.segment_load import Load, segment_momentum
 from cable.moving_end.slack_law import KNOWN
 from cable.moving_end.state import BEFORE, KNOWN_STEPS, LONGEST, NEW, NOW, SPLIT_AT, Line, spacing
@@ -41,6 +42,7 @@ def accept(line: Line, step: float, c: CableNumbers, work: Load) -> None:
     for j in range(N + 1):
         line.tension[BEFORE, j] = line.tension[NOW, j]
         line.tension[NOW, j] = line.tension[NEW, j]
+    keep_friction(line, c)
     fill_node_tensions(line)
     line.ends.since_loose = 0 if line.ends.loose[NOW] > 0.0 else min(line.ends.since_loose + 1, KNOWN_STEPS)
     line.ends.previous_step = step
@@ -82,6 +84,8 @@ def split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) -
             line.node_tension[N] = near + fraction * (end - near)
             line.node_tension[N + 1] = end
             _share_tension(line, N, fraction, near - end)
+    for i in range(3):
+        line.friction[NOW, N, i] = 0.0  # what comes off the drum has not slid yet
     line.length[N] = segment_length
     line.ends.count, line.ends.solver.factored = N + 1, False
     line.ends.settled += segment_length
@@ -196,6 +200,8 @@ def _join(line: Line, j: int, whole: float, cut_off: float) -> None:
             line.tension[level, n] = line.tension[level, n + 1]
     for n in range(j, N):
         line.node_tension[n] = line.node_tension[n + 1]
+        for i in range(3):
+            line.friction[NOW, n, i] = line.friction[NOW, n + 1, i]
     for n in range(j + 1, N):
         line.length[n] = line.length[n + 1]
         line.slip[n], line.normal_gain[n] = line.slip[n + 1], line.normal_gain[n + 1]

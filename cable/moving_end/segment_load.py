@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from cable.moving_end.slack_law import chord_length, squared_share, turning_rate
-from cable.moving_end.state import NOW, Line
+from cable.moving_end.state import NOW, Line, select_section
 from cable.properties import CableNumbers
 from subzero.jit import Record, inlined, inner, made_once
 
@@ -182,6 +182,7 @@ def segment_momentum(line: Line, level: int, j: int, length: float, c: CableNumb
     """Fill ∫p ds of segment j at a level; the tangent is the one of level NOW, where the segment has a length."""
     # At an earlier level the growing segment may have had no length, and so no tangent.
     take_segment(line.position[NOW], line.velocity[level], line.water[level], j, work)
+    select_section(line, c, j)
     whole = line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
     r = chord_length(squared_share(work.chord, whole), whole)
     for i in range(3):

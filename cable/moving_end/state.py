@@ -16,8 +16,9 @@ import numpy as np
 from cable.current import Water, water_velocity
 from cable.drum import TURNING
 from cable.moving_end.slack_law import SMOOTHING
+from cable.properties import CableNumbers, SectionedCableNumbers
 from cable.schemes import TOLERANCE
-from subzero.jit import Record, inlined, inner, made_once
+from subzero.jit import Record, by_field_at, compiled, inlined, inner, made_once
 
 # Levels of time: indices of the first axis of the arrays of `Line`.
 NEW, NOW, BEFORE = 0, 1, 2
@@ -128,6 +129,7 @@ class Ends(Record):
         drum_pull: tension at the drum at level NEW. [N]
         drum_force: the cable's pull on it, with the load of the last half segment (3,). [N]
         drum_velocity: of the drum at level NEW (3,). [m/s]
+        origin: place that positions are counted from, in the axes of the sea bed (3,). [m]
         time: of level NOW. [s]
         previous_step: t_now − t_before, 0 after a start. [s]
         layout: how the cable is divided, and the kind of its far end.
@@ -147,6 +149,7 @@ class Ends(Record):
     drum_pull: float
     drum_force: np.ndarray
     drum_velocity: np.ndarray
+    origin: np.ndarray
     time: float
     previous_step: float
     layout: Layout
@@ -167,6 +170,7 @@ class Line(NamedTuple):
         length: unstretched lengths of the segments (nodes,); of the last one, see `Ends.last_length`. [m]
         node_tension: tension at the nodes at level NOW (nodes,). [N]
         water: velocity of the water at the nodes (3 levels, nodes, 3). [m/s]
+        friction: of the sea bed on the nodes, as a share s of its pressure, at levels NEW and NOW (2, nodes, 3). [-]
         forcing: a further force per length on segment j at level NEW (nodes, 3), for made-up solutions. [N/m]
         slip, normal_gain: corrections for the arc that a segment stands for (nodes,), see `chord_correction`. [m/s, 1]
         load: ∫(∂p/∂t + D − w_c k) ds of the segments at level NEW (nodes, 3). [N]
@@ -184,6 +188,7 @@ class Line(NamedTuple):
     length: np.ndarray
     node_tension: np.ndarray
     water: np.ndarray
+    friction: np.ndarray
     forcing: np.ndarray
     slip: np.ndarray
     normal_gain: np.ndarray
@@ -229,6 +234,7 @@ def _new_ends() -> Ends:
         drum_pull=0.0,
         drum_force=np.zeros(3),
         drum_velocity=np.zeros(3),
+        origin=np.zeros(3),
         time=0.0,
         # 0: there is no earlier level.
         previous_step=0.0,
@@ -246,6 +252,7 @@ def _per_node(n: int) -> dict[str, Any]:
         "tension": np.zeros((3, n)),
         "length": np.zeros(n),
         "node_tension": np.zeros(n),
+        "friction": np.zeros((2, n, 3)),
         "forcing": np.zeros((n, 3)),
         "slip": np.zeros(n),
         # A gain of 1 is no correction.
@@ -314,3 +321,37 @@ def sample_water(line: Line, water: Water, time: float) -> None:
     # Places on level NEW: the water is sampled for the predicted shape.
     for j in range(line.ends.count + 1):
         J[j, 0], J[j, 1], J[j, 2] = water_velocity(water, x[j, 0], x[j, 1], x[j, 2], time)
+
+
+@inlined
+def _now_length(line: Line, j: int) -> float:
+    """Return the length of segment j at level NOW. [m]."""
+    return line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
+
+
+@compiled
+def find_section(line: Line, c: SectionedCableNumbers, j: int) -> None:
+    """Make c describe the section that segment j is in: the one that holds its middle."""
+    if j != c.section_segment + 1:  # no loop along the cable: count from the tow point
+        c.section_along = 0.0
+        for before in range(1, j):
+            c.section_along += _now_length(line, before)
+    k, middle = 0, c.section_along + 0.5 * _now_length(line, j)
+    while middle > c.section_end[k]:
+        k += 1
+    c.section_along, c.section_segment = c.section_along + _now_length(line, j), j
+    if k == c.section_now:
+        return
+    row, c.section_now = c.section[k], k
+    c.mass, c.added_mass, c.weight, c.compliance = row[0], row[1], row[2], row[3]
+    c.retardation, c.tangential_drag, c.normal_drag = row[4], row[5], row[6]
+    c.bed_stiffness, c.bed_damping = row[7], row[8]
+
+
+@inner
+def _is_uniform(line: Line, c: CableNumbers, j: int) -> None:
+    """Select nothing."""
+
+
+select_section = by_field_at("section_end", find_section, _is_uniform)
+"""Make the numbers of a cable describe the section of a segment; a uniform cable compiles nothing of it."""

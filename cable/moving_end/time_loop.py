@@ -22,11 +22,13 @@ from cable.drum_motion import PLACE, SETPOINT, VELOCITY, drum_path, hermite, lea
 from cable.history import Equilibrium, History, Outcome
 from cable.moving_end.energy import FLOWS, LOSS, STORED, book_step, energy_flow
 from cable.moving_end.initial_shape import (
+    division,
     lay_held,
     lay_straight,
     set_steady_tow,
     start_in_water,
     steady_direction,
+    trail_on_bed,
 )
 from cable.moving_end.jolt import take_jolt
 from cable.moving_end.remeshing import accept, end_tensions
@@ -36,6 +38,7 @@ from cable.moving_end.stops import describe_stop
 from cable.moving_end.time_step import try_step
 from cable.properties import CableNumbers
 from cable.schemes import MovingEnd
+from cable.sea_bed import SeaBed
 from cable.task import PullOut, Tow
 from cable.tow_path import (
     TowPath,
@@ -233,7 +236,10 @@ def pull_out(task: PullOut, scheme: MovingEnd) -> History:
     line = new_line(_capacity(task, path, led, segment_length, scheme))
     line.ends.layout.segment_length, line.ends.layout.grading = segment_length, scheme.grading
     line.ends.solver.tolerance, line.ends.layout.run_in = scheme.tolerance, scheme.run_in
-    c, drum = task.cable.numbers(), task.drum.numbers()
+    c, drum = task.cable.numbers(task.bed), task.drum.numbers()
+    line.ends.origin[:] = task.origin
+    line.ends.solver.pulls_only = task.bed is not None and c.compliance > 0.0
+    _refuse_below(task.bed, np.array([path.place[0], led[0, PLACE:VELOCITY]]) + task.origin)
     # The velocity of the drum at the start is needed before the first step sets it.
     drum.velocity[:] = led[0, VELOCITY:SETPOINT]
     if isinstance(start, Equilibrium):
@@ -248,20 +254,28 @@ def tow(task: Tow, scheme: MovingEnd) -> History:
     """Tow a cable of fixed length, as `cable.tow` does."""
     path = sample_path(task.tow_velocity, task.duration, scheme.time_step)
     segments_needed(task.length, scheme.segment_length, 0.0)  # refuses a cable of countless ones
-    count = max(1, int(np.ceil(task.length / scheme.segment_length - 1e-9)))
+    count = division(task.cable, task.length, scheme.segment_length)
     check_memory(path.times.size, count)
-    line, c, idle = new_line(count), task.cable.numbers(), DrumProperties().numbers()
+    line, c, idle = new_line(count), task.cable.numbers(task.bed), DrumProperties().numbers()
+    _refuse_below(task.bed, np.zeros((1, 3)))
     J, tail_drag = task.current.at((0.0, 0.0, 0.0)), task.tail_drag
     uphill = steady_direction(path.leaving, J, task.cable, tail_drag)
     line.ends.layout.segment_length = task.length / count
     lay_straight(line, task.length, uphill, path.leaving[0], idle, c)
     line.ends.layout.free_end, line.ends.layout.tail_drag = True, tail_drag
     line.ends.solver.tolerance = scheme.tolerance
-    set_steady_tow(line, path.leaving[0], J, task.cable, tail_drag)
+    set_steady_tow(line, path.leaving[0], J, task.cable, tail_drag, scheme.segment_length)
     path.place[:] += line.position[NOW, 0]
     # Places are counted from the tail: with this origin the tow point starts at (0, 0, 0), where J was taken.
-    origin = -line.position[NOW, 0]
+    origin = line.ends.origin[:] = -line.position[NOW, 0]
+    trail_on_bed(line, task.bed)
     return _run(line, path, resting(path.times), task.current.numbers(origin), c, idle, scheme.rtol)
+
+
+def _refuse_below(bed: SeaBed | None, ends: np.ndarray) -> None:
+    """Raise an error if an end (n, 3) of a cable is below the bed."""
+    if bed is not None:
+        bed.refuse_below(ends, "pull_out or tow")
 
 
 def led_drum(task: PullOut, times: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """The command line: ``subzero simulate``, ``compare``, ``plot``, ``explore``; ``list``, ``new``, ``show``, ``validate``
-(`trials`); ``manoeuvre``, ``autopilot`` (`autopilot`); ``import`` (`import_log`); ``export-fmu`` (`export_fmu`);
+(`trials`); ``manoeuvre``, ``autopilot`` (`autopilot`); ``import`` (`import_log`);
+``export-fmu`` (`export_fmu`); ``import-line`` (`import_line`);
 ``diagnose``, ``calibrate``,
 ``challenge`` (`diagnosis`); ``sweep`` (`sweep`); ``doctor``, ``warm``, ``completion`` (`install`).
 
@@ -25,7 +26,7 @@ import cyclopts
 from cyclopts import Parameter
 
 import scenarios
-from subzero.cli import autopilot, diagnosis, export_fmu, import_log, install, sweep, trials
+from subzero.cli import autopilot, diagnosis, export_fmu, import_line, import_log, install, sweep, trials
 from subzero.cli.examples import EXAMPLES, register
 from subzero.cli.interrupts import INTERRUPTED, print_interrupted, reset, was_interrupted
 from subzero.cli.output_mode import COMMAND, NOT_STRICT, PLAIN, OutputMode, StrictOutputMode, set_output_mode
@@ -378,7 +379,7 @@ def explore(
 trials.add_to(app)
 for _command in (simulate, compare, plot, explore):
     register(app, _command)
-for _module in (autopilot, import_log, diagnosis, sweep, export_fmu, install):
+for _module in (autopilot, import_log, diagnosis, sweep, export_fmu, import_line, install):
     _module.add_to(app)
 
 

@@ -48,6 +48,7 @@ EXAMPLES = {
         "subzero export-fmu --length 30",
         "subzero export-fmu rov_umbilical --length 60 --longest 200 --out umbilical.fmu",
     ),
+    "import-line": ("subzero import-line mooring.txt",),
     "doctor": ("subzero doctor",),
     "warm": ("subzero warm",),
     "completion": ("subzero completion bash > ~/.local/share/bash-completion/completions/subzero",),

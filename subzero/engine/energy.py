@@ -27,6 +27,7 @@ from cable.moving_end import (
     LOSS,
     STORED,
     STRAINED,
+    TO_BED,
     TOWED,
     damping_loss,
     energy_flow,
@@ -54,7 +55,7 @@ def book(setup: Setup, live: Live, start: float, span: float, steps: int) -> Non
         total[PROPELLER] += half * (old[TOWED] + new[TOWED])
     else:
         _book_hull(setup, live, start, span, steps)
-    total[CABLE_LOSS] += half * (old[LOSS] + new[LOSS])
+    total[CABLE_LOSS] += half * (old[LOSS] + new[LOSS]) + half * (old[TO_BED] + new[TO_BED])
     if setup.fixed.snaps:
         total[CABLE_LOSS] += damping_loss(old, new, span)
     total[DRUM] += half * (old[AT_DRUM] + new[AT_DRUM])

@@ -22,7 +22,7 @@ import numba
 import numpy as np
 
 import scenarios
-from cable import CableProperties
+from cable import CableProperties, SeaBed
 from cable.drum import FREE, LENGTH
 from cable.drum_motion import SETPOINT, lead_drum
 from cable.hold import hold
@@ -41,7 +41,6 @@ from cable.moving_end import (
     take_jolt,
     try_step,
 )
-from cable.properties import CableNumbers
 from cable.task import START_LENGTH
 from subzero.engine.environment import drum_direction, drum_of
 from subzero.engine.external_wrench import sample_current, tow_direction, tow_point
@@ -216,7 +215,7 @@ def lay_out(setup: Setup, live: Live, wet: float) -> None:
     speed = tow_direction(state, fixed.r_c, now.hull.rotation, now.guess)
     for i in range(3):
         fixed.drum_place[i] = now.tow[i] - wet * now.guess[i]
-        setup.water.points[i] = fixed.drum_place[i]
+        setup.water.points[i] = live.line.ends.origin[i] = fixed.drum_place[i]
         pull = fixed.cable.tangential_drag * speed * abs(speed) * wet if fixed.tethered else 0.0
         now.force[i], now.change[i] = -pull * now.guess[i], speed * now.guess[i]
     lead_drum(setup.led, 0.0, fixed.drum)
@@ -244,7 +243,9 @@ def _fixed(trial: scenarios.Trial, model: Model, tethered: bool, lacking: bool) 
     coupled, held = tethered and trial.motion is None, drum.control == LENGTH
     return Fixed(
         vehicle=model.vehicle.own_numbers,
-        cable=_as_joint(cable, model.vehicle, _wet_length(trial)) if coupled and held else cable.numbers(),
+        cable=(_as_joint(cable, model.vehicle, _wet_length(trial)) if coupled and held else cable).numbers(
+            _bed_below(trial, model)
+        ),
         drum=drum,
         r_c=model.vehicle.tow_point.position(),
         drum_place=np.zeros(3),
@@ -260,14 +261,19 @@ def _fixed(trial: scenarios.Trial, model: Model, tethered: bool, lacking: bool) 
     )
 
 
+def _bed_below(trial: scenarios.Trial, model: Model) -> SeaBed | None:
+    """Return the sea bed; none where the vehicle begins below it, which its warning says."""
+    return model.bed if trial.start.depth <= model.sea_bed else None
+
+
 JOINT_TIME = 0.03
 """A cable that does not stretch stops a vehicle within so long where a winch holds its length. [s]"""
 JOINT_DAMPING = 2.0
 """Share of critical damping in it: the impact is plastic. At 1, 13 % of the velocity come back, at 2 some 5 %. [-]"""
 
 
-def _as_joint(cable: CableProperties, vehicle: Vehicle, length: float) -> CableNumbers:
-    """Return the numbers of a cable whose length a winch holds: a joint of vehicle and drum, if it does not stretch.
+def _as_joint(cable: CableProperties, vehicle: Vehicle, length: float) -> CableProperties:
+    """Return a cable whose length a winch holds: a joint of vehicle and drum, if it does not stretch.
 
     A constraint, and the impulse with which it comes into force, are the limit of a spring with a parallel dashpot,
 
@@ -283,11 +289,11 @@ def _as_joint(cable: CableProperties, vehicle: Vehicle, length: float) -> CableN
         length: L, in the water at the start. [m]
     """
     if cable.compliance > 0.0:
-        return cable.numbers()
+        return cable
     mass = 1.0 / vehicle.own_numbers.inverse_mass[0, 0]
     compliance = JOINT_TIME * JOINT_TIME / (max(length, 1.0) * mass)
     damping = 2.0 * JOINT_DAMPING * JOINT_TIME / compliance
-    return replace(cable, compliance=compliance, internal_damping=damping).numbers()
+    return replace(cable, compliance=compliance, internal_damping=damping)
 
 
 def _orders(trial: scenarios.Trial, thrusters: int) -> Orders:
@@ -319,8 +325,15 @@ def hang_between(setup: Setup, live: Live, trial: scenarios.Trial, model: Model)
     """
     fixed, now, wet = setup.fixed, live.now, trial.start.wet_length
     places = np.array([now.tow, now.tow + np.array(trial.start.drum)])
-    held = hold(places, wet, model.water(), cable=model.cable, segment_length=trial.segment_length)
-    fixed.drum_place[:] = setup.water.points[:3] = places[1]
+    held = hold(
+        places,
+        wet,
+        model.water(),
+        cable=model.cable,
+        segment_length=trial.segment_length,
+        bed=_bed_below(trial, model),
+    )
+    fixed.drum_place[:] = setup.water.points[:3] = live.line.ends.origin[:] = places[1]
     led = setup.led
     rate = (
         (led[1, SETPOINT] - led[0, SETPOINT]) / (led[1, 0] - led[0, 0])

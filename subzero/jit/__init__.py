@@ -3,7 +3,7 @@
 name                                            purpose                                               file
 ----------------------------------------------  ----------------------------------------------------  ------------
 compiled, allocating, inner, inlined,
-gated_inlined, by_field                         how a function is compiled                            decorators
+gated_inlined, by_field, by_field_at …          how a function is compiled                            decorators
 Record, made_once                               numbers as one record in memory, a single pointer     record
 scratch                                         a small array on the stack of a compiled function     stack
 compile_in_parallel, Call                       a second process compiles at the same time            parallel
@@ -11,7 +11,16 @@ deferred_signals                                signals wait while code is compi
 -                                               compiled code kept for the next run                   machine_code
 """
 
-from subzero.jit.decorators import allocating, by_field, compiled, gated_inlined, inlined, inner
+from subzero.jit.decorators import (
+    allocating,
+    by_field,
+    by_field_at,
+    by_field_in_step,
+    compiled,
+    gated_inlined,
+    inlined,
+    inner,
+)
 from subzero.jit.parallel import Call, compile_in_parallel
 from subzero.jit.record import Record, made_once
 from subzero.jit.signals import deferred_signals
@@ -22,6 +31,8 @@ __all__ = [
     "Record",
     "allocating",
     "by_field",
+    "by_field_at",
+    "by_field_in_step",
     "compile_in_parallel",
     "compiled",
     "deferred_signals",

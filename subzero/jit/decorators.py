@@ -156,3 +156,37 @@ def by_field(
 
     numba.extending.overload(choose)(typed)
     return choose
+
+
+def by_field_at(
+    field: str, yes: Callable[[Line, Special, int], Result], no: Callable[[Line, General, int], Result]
+) -> Callable[[Line, General, int], Result]:
+    """Return such a function (line, c, index of a segment)."""
+
+    def choose(line, c, j):  # type: ignore[no-untyped-def]
+        return (yes if field in c.dtype.names else no)(line, c, j)
+
+    def typed(line, c, j):  # type: ignore[no-untyped-def]
+        function = cast(Any, yes if field in c.fields else no).py_func
+        return FunctionType(function.__code__, function.__globals__)
+
+    numba.extending.overload(choose)(typed)
+    return choose
+
+
+def by_field_in_step(
+    field: str,
+    yes: Callable[[Line, Special, Any, bool], Result],
+    no: Callable[[Line, General, Any, bool], Result],
+) -> Callable[[Line, General, Any, bool], Result]:
+    """Return such a function (line, c, weights of the step, whether slopes are asked for)."""
+
+    def choose(line, c, w, slopes):  # type: ignore[no-untyped-def]
+        return (yes if field in c.dtype.names else no)(line, c, w, slopes)
+
+    def typed(line, c, w, slopes):  # type: ignore[no-untyped-def]
+        function = cast(Any, yes if field in c.fields else no).py_func
+        return FunctionType(function.__code__, function.__globals__)
+
+    numba.extending.overload(choose)(typed)
+    return choose

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cable import SeaBed
 from cable.doubts import ROUNDING
 from subzero.channels import DEGREE, AnyRun
 from subzero.steady_motion.hull_state_space import ACTUATORS, PLACE, STATES, SURGE, ideal, rate
@@ -77,18 +78,32 @@ def above_surface(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
 
 
 def below_sea_bed(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[str]:
-    """Return warnings of a vehicle or cable below the sea bed of the trial."""
+    """Return warnings of a vehicle below the sea bed of the trial, or of a cable that it takes there.
+
+    The bed holds the cable, which sinks in a little.
+    """
     if trial.sea_bed <= 0.0:
         return []
-    words = "which no equation knows: nothing holds it up there. Change the trial, or water.sea_bed_m."
+    words = (
+        "where it cannot be: the bed holds the cable, and no vehicle. Change the trial, or water.sea_bed_m."
+    )
     where = f"below the sea bed at {trial.sea_bed:g} m"
-    return _out_of_bounds(run, model, lambda depth: depth - trial.sea_bed, where, words)
+    # By a diameter, and twice as deep as at rest, a cable may be pressed in.
+    sinks = model.cable.diameter + 2.0 * SeaBed(depth=trial.sea_bed).sinkage(model.cable)
+    return _out_of_bounds(run, model, lambda depth: depth - trial.sea_bed, where, words, sinks)
 
 
 def _out_of_bounds(
-    run: AnyRun, model: Model, beyond: Callable[[np.ndarray], np.ndarray], where: str, words: str
+    run: AnyRun,
+    model: Model,
+    beyond: Callable[[np.ndarray], np.ndarray],
+    where: str,
+    words: str,
+    sinks: float = 0.0,
 ) -> list[str]:
-    """Return sentences about vehicle and cable where `beyond` of their depth is above zero [m]."""
+    """Return sentences about vehicle and cable where `beyond` of their depth is above zero [m], of the cable above
+    `sinks` [m].
+    """
     time, said = run["time"].values, []
     places = {"vehicle": (run["depth"].values[:, None], 0.0)}
     if run.attrs["tethered"] and run["node_count"].values.any():
@@ -98,8 +113,9 @@ def _out_of_bounds(
     for name, (down, offset) in places.items():
         farthest = np.concatenate([_farthest(beyond, down[block] + offset) for block in blocks_of(time.size)])
         row = int(farthest.argmax())
-        if farthest[row] > ROUNDING:
-            depth, first = down[row] + offset, first_time(time, farthest > ROUNDING)
+        limit = ROUNDING + (sinks if name == "cable" else 0.0)
+        if farthest[row] > limit:
+            depth, first = down[row] + offset, first_time(time, farthest > limit)
             worst = depth[np.nanargmax(beyond(depth))]
             said.append(
                 f"The {name} is {where} from {first:g} s on, and at a depth of {worst:.3g} m at "

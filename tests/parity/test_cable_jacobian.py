@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from cable import CableProperties, DrumProperties
+from cable import CableProperties, DrumProperties, SeaBed
 from cable.current import Current
 from cable.drum import SPINNING, STANDING, TURNING
 from cable.moving_end.assembly import assemble
@@ -165,6 +165,31 @@ def test_bending_has_its_jacobian_right_too(segments):
     weights = backward_weights.py_func(0.1, 0.1)
     numeric, _ = differences(line, work, weights, STIFF)
     analytic = dense(line)
+    numeric[-2:] = analytic[-2:]
+    largest = np.abs(analytic).max(axis=1, keepdims=True)
+    assert_allclose(analytic / largest, numeric / largest, rtol=0, atol=2e-6)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.2, 50.0], ids=["smooth", "slides", "sticks"])
+def test_a_sea_bed_has_its_jacobian_right_too(friction):
+    """All nodes are in the ground."""
+    bed = SeaBed(
+        depth=-0.3,
+        slope_north=0.02,
+        slope_east=-0.2,
+        damping_ratio=0.01,
+        axial_friction=friction,
+        lateral_friction=0.5 * friction,
+    )
+    c = CableProperties(mass_per_length=0.02, compliance=0.05, diameter=0.06).numbers(bed)
+    line, work = bent_line(5, TURNING, 4, c=c)
+    line.friction[NOW] = (
+        0.1 * friction * np.random.default_rng(1).uniform(-1.0, 1.0, line.friction[NOW].shape)
+    )
+    weights = backward_weights.py_func(0.1, 0.1)
+    numeric, _ = differences(line, work, weights, c)
+    analytic = dense(line)
+    assert np.any(line.friction[NEW] if friction else line.rows[RESIDUAL])
     numeric[-2:] = analytic[-2:]
     largest = np.abs(analytic).max(axis=1, keepdims=True)
     assert_allclose(analytic / largest, numeric / largest, rtol=0, atol=2e-6)
