@@ -2,9 +2,9 @@
 
 Verifies: a clump and a float on a weightless line, whose halves are straight; that two equal sections are one cable;
 that the forces at both ends carry both sections; a tow cable with array, depressor and drogue that is towed steadily
-and remains so, with the forces added up by hand; the three-section tow in a turn of 640 m radius (the case of Ablow and
-Schechter, Ocean Engineering 10, 1983, with the numbers that later papers print for it), which converges at second
-order; energy; mirror; messages. Tolerance: Newton's method leaves 1e-9; arc corrections change a steady tow by 2e-4.
+and remains so, with the forces added up by hand; a three-section tow in a turn of 640 m radius (of the kind of Ablow
+and Schechter, Ocean Engineering 10, 1983; its numbers were not read in that paper), which converges at second order;
+energy; mirror; messages. Tolerance: Newton's method leaves 1e-9; arc corrections change a steady tow by 2e-4.
 """
 
 import numpy as np
@@ -136,7 +136,6 @@ def turned(segment):
 def test_a_tow_cable_with_array_and_drogue_converges_in_a_turn_of_640_m():
     found = np.array([turned(size) for size in (40.0, 20.0, 10.0, 5.0)])
     changes = np.abs(np.diff(found, axis=0)) / found[-1]
-    print(found)
     assert (changes[-1] < 2e-3).all(), changes
     assert (changes[-1] < 0.45 * changes[-2]).all(), changes
 

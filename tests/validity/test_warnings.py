@@ -479,7 +479,7 @@ def test_a_dive_below_the_sea_bed_says_when(tethered):
 
 
 def test_a_heavy_cable_that_is_dragged_deep_into_the_sea_bed_says_so():
-    """2 cm deep, eight diameters of 2.5 mm: the bed holds it, and not as well as it should."""
+    """No more than a tenth of a metre deep: the bed holds it, though it is soft."""
     trial = trial_of(
         held=(25.0, 0.0, 0.0, 0.0),
         cable=HEAVY,
@@ -489,7 +489,8 @@ def test_a_heavy_cable_that_is_dragged_deep_into_the_sea_bed_says_so():
     )
     (said,) = warned(trial)["below_sea_bed"]
     assert said.startswith("The cable is below the sea bed at 2.5 m")
-    assert "at a depth of 2.52 m" in said
+    deepest = float(said.partition("at a depth of ")[2].split()[0])
+    assert 2.5 < deepest < 2.6
 
 
 @pytest.mark.parametrize("share, warns", [(0.9, True), (1.1, False)])
