@@ -211,7 +211,10 @@ def data_terms(model: Model) -> list[Term]:
             for f, turns, words in (*KNOWN, *(KNOWN_ANGLES if sensor.angle else ()))
         ]
         soft = [("offset", "has an offset"), ("scale", "has an error of scale"), ("drift", "drifts")]
-        if not sensor.logger:  # channels of one logger have one clock
+        sharing = [
+            other for other in model.channels.values() if sensor.logger and other.logger == sensor.logger
+        ]
+        if len(sharing) < 2:  # channels of one logger have one clock
             soft.append(("delay", "is late or early against the inputs"))
         found += [
             Term(f"{kind}:{name}", f"{name} {words}", kind, name, odds / len(soft)) for kind, words in soft

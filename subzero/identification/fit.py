@@ -163,8 +163,8 @@ def _within(
     centre = np.array([entry.centre for entry in entries])
     low, high = ((bound - centre) / sd for bound in bounds(entries))
     held = np.zeros(sd.size, dtype=bool)
-    while (outside := ~held & ((z < low) | (z > high))).any():
-        held |= outside
+    while (beyond := ~held & ((z < low) | (z > high))).any():
+        held |= beyond
         z = np.clip(z, low, high)
         free = ~held
         if free.any():
@@ -263,7 +263,7 @@ def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Le
     """Return levels with the noise of a channel that has the highest evidence, given those of all others."""
     before, prior = levels.noise[name], problem.channels[name].prior
     times, columns = given_others(problem, linear, products, levels, name)
-    room = np.empty((columns.shape[1], columns.shape[1])), np.empty((2, columns.shape[1]))
+    work = np.empty((columns.shape[1], columns.shape[1])), np.empty((2, columns.shape[1]))
 
     def at(log: np.ndarray) -> Noise:
         white, slow, time = (np.array([before.white, before.slow, before.time]) * np.exp(log)).tolist()
@@ -275,7 +275,7 @@ def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Le
         if not np.isfinite(density):
             return 1e300
         given = Filter.of(noise, prior.resolution, times)
-        return -log_marginal(given.decay, given.gain, given.scale, columns, *room) - density
+        return -log_marginal(given.decay, given.gain, given.scale, columns, *work) - density
 
     lasting = np.log(
         np.array([before.time, *(share * prior.interval for share in TIMES_TRIED)]) / before.time

@@ -395,7 +395,7 @@ def _input(record: Record, name: str) -> np.ndarray:
 
 def spikes(values: np.ndarray, far: float, turn: float) -> np.ndarray:
     """Return which readings (m,) are alone far from a line, and from a cubic, through those next to them, where these
-    agree: a curve that is sampled coarsely has no spikes, and neither has what stands beside one. Of two side by side
+    agree: a curve that is sampled coarsely has no spikes, nor has the neighbour of one. Of two in a row
     each is twice as far from six neighbours, most of which agree.
     """
     found, at = np.zeros(values.size, dtype=bool), np.flatnonzero(np.isfinite(values))
@@ -431,7 +431,7 @@ def spikes_at_ends(away: np.ndarray, far: float) -> np.ndarray:
     """Return which of the first and last two of residuals (m,) are far from the four next to them, which agree."""
     found, at = np.zeros(away.size, dtype=bool), np.flatnonzero(np.isfinite(away))
     for ends in (at, at[::-1]) if at.size > 5 else ():
-        beside = away[ends[2:6]]
-        off = np.abs(away[ends[:2]] - np.median(beside))
-        found[ends[:2]] |= (off > far) & (np.ptp(beside) < 0.5 * off)
+        neighbours = away[ends[2:6]]
+        off = np.abs(away[ends[:2]] - np.median(neighbours))
+        found[ends[:2]] |= (off > far) & (np.ptp(neighbours) < 0.5 * off)
     return found

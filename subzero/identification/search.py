@@ -143,9 +143,9 @@ class Search:
                     size=-term.size,
                 )
 
-    def _fit(self, terms: Terms, start: Linear, promised: float = -np.inf) -> Fit:
+    def _fit(self, terms: Terms, start: Linear, expected: float = -np.inf) -> Fit:
         """Return the fit of an explanation from a start; also from the nominal model, if it is much less probable than
-        the linear problem promised: the way there may be barred by what another explanation bent.
+        expected of the linear problem: what another explanation moved may bar the way there.
         """
         name = key(terms)
         if name in self._tried:
@@ -155,7 +155,7 @@ class Search:
         self.progress(min(0.9, 0.05 + 0.02 * len(self.fits)), f"fit of {words}")
         values: dict[Entry, float] = dict(zip(start.entries, start.x.tolist(), strict=True))
         fitted = fit(self.problem, terms, values, start.levels)
-        if self.score(fitted) < promised - WORTH:
+        if self.score(fitted) < expected - WORTH:
             own = {entry: value for entry, value in values.items() if entry.kind not in OF_MODEL}
             if can_begin(self.problem, terms, own):
                 again = fit(self.problem, terms, own, usual_levels(self.problem))

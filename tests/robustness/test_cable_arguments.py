@@ -64,7 +64,7 @@ def test_a_value_that_makes_no_sense_is_refused_where_it_is_made(make, said):
         ({"scheme": "lumpd"}, "Did you mean 'lumped'"),
         ({"scheme": cable.MovingEnd}, "must be a text or MovingEnd or Lumped or Equation7 or Paper."),
         ({"drum": 0.1}, "pull_out: drum is 0.1; it must be DrumProperties or"),
-        ({"cable": 0.1}, "cable is 0.1; it must be CableProperties or None."),
+        ({"cable": 0.1}, "cable is 0.1; it must be CableProperties or SectionedCable or None."),
         ({"start": -1.0}, "start is -1"),
     ],
 )
