@@ -25,6 +25,7 @@ def in_the_middle(**body):
     return SectionedCable(sections=[Section(10.0, NEUTRAL)], bodies=[Body(5.0, **body)])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("mass", "volume"), [(2.0, 0.0), (0.5, 2e-3)], ids=["clump", "float"])
 def test_a_body_on_a_weightless_line_makes_a_triangle(mass, volume):
     """Sides 5, 4, 3: the pull along the chord is 4/3 of half of the weight."""
@@ -37,6 +38,7 @@ def test_a_body_on_a_weightless_line_makes_a_triangle(mass, volume):
     assert_allclose(deepest, [4.0, 0.0, 3.0 * np.sign(weight)], atol=1e-9)
 
 
+@pytest.mark.long
 def test_two_equal_sections_are_one_cable():
     two = SectionedCable(sections=[Section(4.0, HEAVY), Section(6.0, HEAVY)])
     for current in ((0.0, 0.0, 0.0), (0.1, 0.3, 0.0)):
@@ -45,6 +47,7 @@ def test_two_equal_sections_are_one_cable():
         assert_allclose(parts.tow_force, whole.tow_force, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.long
 def test_forces_at_both_ends_carry_both_sections():
     light = cable.CableProperties(mass_per_length=0.12, cross_section_area=1e-4)
     line = SectionedCable(sections=[Section(7.0, HEAVY), Section(3.0, light)], bodies=[Body(7.0, mass=1.0)])
@@ -53,6 +56,7 @@ def test_forces_at_both_ends_carry_both_sections():
     assert_allclose(held.tow_force + held.drum_force, [0.0, 0.0, weight], atol=1e-8 * weight)
 
 
+@pytest.mark.long
 def test_energy_of_bodies_is_booked_and_a_mirrored_run_is_mirrored():
     line = in_the_middle(mass=2.0, volume=1e-3, drag_area=0.02, lift_area=0.01)
     forces = []
@@ -76,6 +80,7 @@ TOWED = SectionedCable(
 )
 
 
+@pytest.mark.long
 def test_a_steady_tow_of_sections_and_bodies_remains_steady():
     run = cable.tow(
         lambda t: (3.0, 0.0, 0.0), 300.0, 60.0, cable=TOWED, scheme=cable.MovingEnd(segment_length=5.0)
@@ -170,6 +175,7 @@ def test_what_makes_no_sense_is_refused(call, words):
         call()
 
 
+@pytest.mark.long
 def test_every_line_type_has_ranges_that_hold_its_values_and_sources():
     from cable.sections import _library
 
