@@ -175,7 +175,6 @@ def test_what_makes_no_sense_is_refused(call, words):
         call()
 
 
-@pytest.mark.long
 def test_every_line_type_has_ranges_that_hold_its_values_and_sources():
     from cable.sections import _library
 
