@@ -25,7 +25,7 @@ import scenarios
 from cable import CableProperties, DrumProperties, SeaBed
 from cable.current import Current
 from subzero.arguments import checked_arguments
-from subzero.errors import BadValueError, short, suggestion
+from subzero.errors import BadValueError, checked, short, suggestion
 from subzero.external_force import MissingForce
 from vehicle import Vehicle, VehicleError, from_mapping, to_mapping
 
@@ -60,7 +60,8 @@ class Model:
     sea_bed: float = 0.0
 
     def __post_init__(self) -> None:
-        """Keep the current as plain numbers."""
+        """Keep the current as plain numbers, and refuse a bed above the surface."""
+        checked("Model", "sea_bed", self.sea_bed, least=0.0, unit="m")
         object.__setattr__(self, "current", tuple(map(float, self.current)))
 
     @classmethod

@@ -70,7 +70,7 @@ LEGAL = {
         "hold.current hold.segment_length hold.start load_scenario.commands_csv load_scenario.motion_csv "
         "plan_sweep.changes pull_out.cable pull_out.current pull_out.drum simulate.checkpoint simulate.every "
         "simulate.model simulate.progress simulate_many.every simulate_many.progress simulate_many.workers "
-        "tow.cable tow.current",
+        "tow.cable tow.current pull_out.bed tow.bed hold.bed",
     "[]":
         "simulate.later simulate_many.trials compare.later check.later read_trials.paths catalogue.channels "
         "catalogue.more all_effects.more calibration.read.records Kept.scalars Kept.channels",
