@@ -13,7 +13,7 @@ what fits its errors best.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -263,58 +263,65 @@ def likeliest_noise(errors: np.ndarray, old: Noise) -> Noise:
 
 def result_of(one: Drawn) -> dict[str, Any]:
     """Return what a record is and what the diagnosis says of it."""
-    found = {"index": one.index, "flown": one.flown, "family": one.family, "cause": one.cause}
-    try:
-        logged, planted, errors = made(one)
-        problem = with_true_noise(pose([logged]), FAMILIES[one.family], errors)
-        D = discriminations(problem, sensitivities(problem), planted) if planted else {}
-        start, cpu = perf_counter(), process_time()
-        verdict = diagnose_trials([logged], seed=one.index, budget="verdict")
-        took = {"seconds": perf_counter() - start, "cpu": process_time() - cpu}
-        first, p = next(iter(verdict.probabilities.items()))
-        said = {
-            "D": {name: value for name, (value, _) in D.items()},
-            "rival": {k: v for k, (_, v) in D.items()},
-        }
-        said |= {"verdict": verdict.verdict, "named": [cause.id for cause in verdict.causes], "first": first}
-        said |= {"p": p, "listed": dict(list(verdict.probabilities.items())[:6])}
-        noise = {name: [m.noise_sd, m.noise_slow, m.noise_time, m.resolution]
-                 for rows in verdict.misfit.values() for name, m in rows.items()}  # fmt: skip
-        return found | said | {"noise": noise, **took}
-    except Exception as error:
-        return {**found, "error": repr(error)}
-
-
-CATALOGUE_ID = {"offset": "sensor_bias", "scale": "sensor_scale", "delay": "clock_offset"}
-"""Kind of an error in the data, to a model of any kind → what the catalogue calls it."""
+    return _result(one, _by_catalogue)
 
 
 def result_of_any_model(one: Drawn) -> dict[str, Any]:
     """Return the same of the engine for any model, to which the tethered vehicle is one (`vehicle_model`)."""
+    return _result(one, _by_any_model)
+
+
+def _result(one: Drawn, diagnosed: Callable[[Logged, int], dict[str, Any]]) -> dict[str, Any]:
     found = {"index": one.index, "flown": one.flown, "family": one.family, "cause": one.cause}
     try:
         logged, planted, errors = made(one)
         problem = with_true_noise(pose([logged]), FAMILIES[one.family], errors)
         D = discriminations(problem, sensitivities(problem), planted) if planted else {}
+        size = {"D": {k: v for k, (v, _) in D.items()}, "rival": {k: v for k, (_, v) in D.items()}}
         start, cpu = perf_counter(), process_time()
-        model, records = vehicle_model([logged])
-        verdict = identification.diagnose(records, model)
-        took = {"seconds": perf_counter() - start, "cpu": process_time() - cpu}
-        listed = {
-            " + ".join(map(_as_in_catalogue, name.split(" + "))): p
-            for name, p in verdict.explanations.items()
-        }
-        first, p = next(iter(listed.items()))
-        named = [_as_in_catalogue(each.id) for each in verdict.named]
-        kind = (
-            "cause_named" if set(named) & {one.cause} else verdict.verdict
-        )  # errors of sensors are causes there
-        said = {"D": {k: v for k, (v, _) in D.items()}, "rival": {k: v for k, (_, v) in D.items()}}
-        return (
-            found | said | {"verdict": kind, "named": named, "first": first, "p": p, "listed": listed, **took}
-        )
+        said = diagnosed(logged, one.index)
+        return found | size | said | {"seconds": perf_counter() - start, "cpu": process_time() - cpu}
     except Exception as error:
         return {**found, "error": repr(error)}
+
+
+def _by_catalogue(logged: Logged, seed: int) -> dict[str, Any]:
+    verdict = diagnose_trials([logged], seed=seed, budget="verdict")
+    first, p = next(iter(verdict.probabilities.items()))
+    noise = {
+        name: [m.noise_sd, m.noise_slow, m.noise_time, m.resolution]
+        for rows in verdict.misfit.values()
+        for name, m in rows.items()
+    }
+    listed = dict(list(verdict.probabilities.items())[:6])
+    named = [cause.id for cause in verdict.causes]
+    return {
+        "verdict": verdict.verdict,
+        "named": named,
+        "first": first,
+        "p": p,
+        "listed": listed,
+        "noise": noise,
+    }
+
+
+CATALOGUE_ID = {"offset": "sensor_bias", "scale": "sensor_scale", "delay": "clock_offset"}
+"""Kind of an error in the data, to a model of any kind → what the catalogue calls it."""
+CAUSE_NAMED = "cause_named"
+
+
+def _by_any_model(logged: Logged, seed: int) -> dict[str, Any]:
+    model, records = vehicle_model([logged])
+    verdict = identification.diagnose(records, model)
+    listed: dict[str, float] = {}
+    for name, p in verdict.explanations.items():
+        known = " + ".join(map(_as_in_catalogue, name.split(" + ")))
+        listed[known] = listed.get(known, 0.0) + p
+    first, p = max(listed.items(), key=lambda pair: pair[1])
+    named = [_as_in_catalogue(each.id) for each in verdict.named]
+    errors_of_sensors = {name for name in named if name.startswith(tuple(CATALOGUE_ID.values()))}
+    kind = CAUSE_NAMED if errors_of_sensors else verdict.verdict  # they are causes in the catalogue
+    return {"verdict": kind, "named": named, "first": first, "p": p, "listed": listed}
 
 
 def _as_in_catalogue(name: str) -> str:

@@ -41,11 +41,14 @@ def station_of(trial: scenarios.Trial, vehicle: Vehicle) -> Station:
         return Station(np.zeros((0, 5)), np.zeros(7), np.zeros((0, 6)), np.zeros(INTEGRALS))
     lacking = unheld_axes(vehicle.thruster_list, HELD)
     if lacking:
-        have = (
-            f"its {len(vehicle.thrusters)} thrusters" if vehicle.thrusters else "it has no thrusters, which"
+        count = len(vehicle.thrusters)
+        why = (
+            f"its {count} thrusters cannot push along {', '.join(lacking)} alone"
+            if count
+            else "it has no thrusters"
         )
         raise UserError(
-            f"'{trial.name}' asks its vehicle to keep a station: {have} cannot push along {', '.join(lacking)} alone."
+            f"'{trial.name}' asks its vehicle to keep a station, but {why}."
             " Take a vehicle such as bluerov2_heavy, or give [commands] in place of [station]."
         )
     mass = np.diag(vehicle.own_numbers.mass_matrix).copy()

@@ -3,7 +3,7 @@
 `draw` gives the figures that belong to some runs. A run that follows commands gets the four panels of Fig. 6 of Feng
 and Allen (2004), actuators and attitude (one on station its place and its thrusters instead), the cable's shape, the
 tension along it over time, forces and energy. A prescribed run gets Fig. 4 if it is straight, with its exact solution,
-and Fig. 5 if it is not, besides the cable. A winch, or a vessel that carries the drum, adds a figure of what it does.
+and Fig. 5 if it is not, besides the cable. A winch, or a vessel that carries the drum, adds a figure of its motion.
 Inside `page_width` they are as narrow as a column of a page.
 """
 

@@ -1,5 +1,5 @@
 """Is the model near at all? For each channel what the best explanation leaves; how large the unknown inputs have to be;
-how far it moves what it does not name.
+how far parameters that it does not name are from their nominal values.
 
     R = rms(residual) / level of the sensor     after the unknown inputs, and in a free simulation without them
     size / declared size                            of every unknown input
