@@ -84,6 +84,43 @@ def test_what_follows_from_the_shape_is_what_the_geometry_formulas_give(tmp_path
     assert contradictions(made_here) == []
 
 
+STRIPS = {
+    "linear_damping.sway": (0, 1),
+    "linear_damping.yaw": (2, 1),
+    "linear_damping.roll": (0, 3),
+    "quadratic_damping.sway_per_sway": (0, 1),
+    "quadratic_damping.yaw_per_sway": (1, 1),
+    "quadratic_damping.sway_per_yaw": (2, 1),
+    "quadratic_damping.yaw_per_yaw": (3, 1),
+    "quadratic_damping.roll_per_roll": (0, 4),
+    "body_lift.sway_per_sway": (0, 1),
+    "body_lift.yaw_per_sway": (1, 1),
+    "body_lift.yaw_per_yaw": (2, 1),
+}
+"""Number → n, m of the integral ∫ |x|ⁿ Rᵐ dx along the hull that strip theory gives it (docs/hull.md)."""
+PLACES = {"rudder.station": (1, 0), "tow_point.x": (1, 0), "rudder.arm": (0, 1), "rudder.area": (0, 2)}
+"""Number → powers of length and diameter."""
+
+
+def strip(long: float, wide: float, n: int, m: int) -> float:
+    x = np.linspace(-0.5 * long, 0.5 * long, 4001)
+    R = 0.5 * wide * np.sqrt(np.maximum(1.0 - (2.0 * x / long) ** 2, 0.0))
+    return float(np.sum(np.abs(x) ** n * R**m) * (x[1] - x[0]))
+
+
+def test_damping_lift_and_fins_of_a_longer_and_thinner_hull_follow_strip_theory(tmp_path):
+    base = numbers_of("torpedo")
+    long, wide = 1.5, 0.8
+    sizes = (long * base["hull.length"], wide * base["hull.diameter"])
+    made(tmp_path, "length_m = {!r}\ndiameter_m = {!r}".format(*sizes))
+    found = numbers_of(tmp_path / "auv.toml")
+    for name, (n, m) in STRIPS.items():
+        ratio = strip(long, wide, n, m) / strip(1.0, 1.0, n, m)
+        assert found[name] == pytest.approx(ratio * base[name], rel=1e-5), name  # six digits are written
+    for name, (along, across) in PLACES.items():
+        assert found[name] == pytest.approx(long**along * wide**across * base[name], rel=1e-5), name
+
+
 def test_a_lighter_hull_of_the_same_size_is_leaner_and_displaces_its_weight_and_buoyancy(tmp_path):
     light = made(tmp_path, "length_m = 2.0\ndiameter_m = 0.2\nmass_kg = 45\nnet_buoyancy_N = 20")
     assert light.water.density * displaced_volume(light.hull) == pytest.approx(45.0 + 20.0 / 9.81, rel=1e-3)
