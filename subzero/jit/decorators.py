@@ -7,6 +7,7 @@ code. Setting ``NUMBA_DISABLE_JIT=1`` runs the same code interpreted.
 from __future__ import annotations
 
 import gc
+import hashlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FunctionType
@@ -96,7 +97,7 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]  # numba has no types
 
     def compile(self, signature: Any) -> Any:
         """Compile or load the function for a signature."""
-        with _undisturbed():
+        with _undisturbed(), _named_by(self.py_func, signature):
             return super().compile(signature)
 
     def get_call_template(self, arguments: Any, named: Any) -> Any:
@@ -104,6 +105,26 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]  # numba has no types
         unliteral = numba.types.unliteral
         kinds = {name: unliteral(kind) for name, kind in named.items()}
         return super().get_call_template(tuple(map(unliteral, arguments)), kinds)
+
+
+@contextmanager
+def _named_by(function: Any, signature: Any) -> Iterator[None]:
+    """Name a function by the types of its arguments while it is compiled.
+
+    The names in kept code are all that a linker goes by, and numba makes them of numbers that it counts anew in each
+    process: code of two processes for two kinds of records had the same name, and one was taken for the other.
+    """
+    name = function.__qualname__
+    function.__qualname__ = f"{name}_{_digest(signature)}"
+    try:
+        yield
+    finally:
+        function.__qualname__ = name
+
+
+def _digest(signature: Any) -> str:
+    """Return 24 hexadecimal digits of types of arguments, the same in every process."""
+    return hashlib.sha256(repr(signature).encode()).hexdigest()[:24]
 
 
 class InnerKernel(Kernel):
@@ -139,6 +160,14 @@ def _undisturbed() -> Iterator[None]:
                 gc.enable()
 
 
+def _plain(kernel: Any, kinds: Any) -> FunctionType:
+    """Return the function of a kernel without annotations, named by types of its arguments as by `_named_by`."""
+    function = kernel.py_func
+    plain = FunctionType(function.__code__, function.__globals__)
+    plain.__qualname__ = f"{function.__qualname__}_{_digest(kinds)}"
+    return plain
+
+
 def by_field(
     field: str, yes: Callable[[Line, Special], Result], no: Callable[[Line, General], Result]
 ) -> Callable[[Line, General], Result]:
@@ -151,8 +180,7 @@ def by_field(
         return (yes if field in c.dtype.names else no)(line, c)
 
     def typed(line, c):  # type: ignore[no-untyped-def]
-        function = cast(Any, yes if field in c.fields else no).py_func
-        return FunctionType(function.__code__, function.__globals__)  # without annotations, too
+        return _plain(yes if field in c.fields else no, (line, c))
 
     numba.extending.overload(choose)(typed)
     return choose
@@ -167,8 +195,7 @@ def by_field_at(
         return (yes if field in c.dtype.names else no)(line, c, j)
 
     def typed(line, c, j):  # type: ignore[no-untyped-def]
-        function = cast(Any, yes if field in c.fields else no).py_func
-        return FunctionType(function.__code__, function.__globals__)
+        return _plain(yes if field in c.fields else no, (line, c))
 
     numba.extending.overload(choose)(typed)
     return choose
@@ -185,8 +212,7 @@ def by_field_in_step(
         return (yes if field in c.dtype.names else no)(line, c, w, slopes)
 
     def typed(line, c, w, slopes):  # type: ignore[no-untyped-def]
-        function = cast(Any, yes if field in c.fields else no).py_func
-        return FunctionType(function.__code__, function.__globals__)
+        return _plain(yes if field in c.fields else no, (line, c))
 
     numba.extending.overload(choose)(typed)
     return choose

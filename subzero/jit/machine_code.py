@@ -195,7 +195,7 @@ class MachineCode:
         if folder is None:
             return None
         # `magic_tuple` has the processor and its features: several machines may share a home folder.
-        what = (function.__module__, function.__qualname__, function.__code__.co_firstlineno)
+        what = (function.__module__, function.__code__.co_qualname, function.__code__.co_firstlineno)
         digest = hashlib.sha256(repr((what, str(signature), codegen.magic_tuple())).encode()).hexdigest()
         return folder / f"{function.__name__[:80]}-{digest[:24]}{SUFFIX}"
 

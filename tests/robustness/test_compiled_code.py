@@ -205,6 +205,62 @@ for k in range(100):
     assert [path.name for path in base.iterdir()] == ["same.code"]
 
 
+TWO_KINDS = """
+import sys
+from subzero.jit import compiled, inner
+from subzero.jit.record import Record
+
+class Low(Record):
+    first: float
+    second: float
+
+class High(Record):
+    second: float
+    first: float
+
+@inner
+def _long_sum(n, r):  # too long to become a part of its caller
+    total = 0.0
+    for i in range(n):
+        for j in range(i):
+            if j % 3 == 1:
+                total += r.first * (i - j)
+            elif total > 1e300:
+                total -= _long_sum(n - 1, r)
+            else:
+                total -= r.first * (i - j)
+    return total + r.first
+
+@compiled
+def tenfold(r):
+    return 10.0 * _long_sum(1, r) + _long_sum(0, r) + _long_sum(1, r)
+
+for kind in sys.argv[1:]:
+    print(tenfold({"Low": Low, "High": High}[kind](first=1.0, second=2.0)))
+"""
+
+
+def test_code_that_two_processes_have_kept_for_two_kinds_of_records_is_not_confused(base, tmp_path):
+    """A linker takes the first of two functions of one name; numba numbers kinds of records in each process anew."""
+    path = tmp_path / "two_kinds.py"
+    path.write_text(TWO_KINDS)
+
+    def run(*kinds):
+        called = [sys.executable, str(path), *kinds]
+        return subprocess.run(
+            called,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=120,
+            cwd=ROOT,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+        ).stdout.split()
+
+    assert run("Low") == run("High") == ["12.0"]
+    assert run("Low", "High") == run("High", "Low") == ["12.0", "12.0"]
+
+
 def test_every_compiled_function_and_what_it_names_is_in_its_key():
     """Looked up in the running program: modules, functions and classes among the globals of compiled functions."""
     import subzero.diagnosis.inference
