@@ -34,6 +34,13 @@ def place_of(name: str) -> tuple[str, int, int] | None:
     return kind, FORCES.index(found[1]), SPEEDS.index(found[2])
 
 
+def is_table(value: object) -> bool:
+    """Return whether a value is a tuple of pairs, each of a name and something."""
+    return isinstance(value, tuple) and all(
+        isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[0], str) for pair in value
+    )
+
+
 @dataclass(frozen=True)
 class Derivatives:
     """Derivatives of a hull by name, such as ("X_u", -13.7); none for a hull that is stated otherwise.
@@ -46,6 +53,9 @@ class Derivatives:
 
     def __post_init__(self) -> None:
         """Raise an error for derivatives that cannot be."""
+        if not is_table(self.table):
+            why, allowed = "this is no table of numbers", 'pairs such as ("X_u", -13.7)'
+            raise VehicleError((_problem("table", short(self.table), why, allowed),))
         problems = []
         for name, value in self.table:
             place, number = place_of(name), real(value)

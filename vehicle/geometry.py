@@ -133,11 +133,12 @@ def planform_area(hull: Hull) -> float:
 
 def lamb_factors(slenderness: float) -> LambFactors:
     """Return Lamb's factors of a prolate spheroid, length over diameter above 1 (Lamb 1932, section 114)."""
-    e2 = 1.0 - 1.0 / slenderness**2
+    squared = (1.0 / slenderness) ** 2  # 1 − e²: as that difference it would be lost of a thread
+    e2 = 1.0 - squared
     e = math.sqrt(e2)
-    log = math.log((1.0 + e) / (1.0 - e))
-    alpha = 2.0 * (1.0 - e2) / e**3 * (0.5 * log - e)
-    beta = 1.0 / e2 - (1.0 - e2) / (2.0 * e**3) * log
+    log = 2.0 * math.log((1.0 + e) * slenderness)  # of (1 + e)/(1 − e)
+    alpha = 2.0 * squared / e**3 * (0.5 * log - e)
+    beta = 1.0 / e2 - squared / (2.0 * e**3) * log
     k_prime = e2**2 * (beta - alpha) / ((2.0 - e2) * (2.0 * e2 - (2.0 - e2) * (beta - alpha)))
     return LambFactors(alpha / (2.0 - alpha), beta / (2.0 - beta), k_prime)
 

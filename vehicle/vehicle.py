@@ -22,7 +22,7 @@ from vehicle.axial_drag import AxialDrag
 from vehicle.body_lift import BodyLift
 from vehicle.cross_flow import CrossFlowDrag
 from vehicle.damping import LinearDamping, QuadraticDamping
-from vehicle.derivatives import NO_DERIVATIVES, Derivatives, derivatives_of
+from vehicle.derivatives import NO_DERIVATIVES, Derivatives, derivatives_of, is_table
 from vehicle.fins import FinNumbers, Fins
 from vehicle.geometry import Hull, TowPoint
 from vehicle.motor import Battery, Motor, MotorNumbers, motor_numbers
@@ -297,6 +297,9 @@ def _lists(mapping: Mapping[str, object], problems: list[Problem]) -> dict[str, 
 
 def _thruster_problems(thrusters: tuple[tuple[str, Thruster], ...]) -> list[Problem]:
     """Return the problems of a list of thrusters that are valid by themselves."""
+    if not is_table(thrusters) or not all(isinstance(each, Thruster) for _, each in thrusters):
+        why, allowed = "this is no such part", "pairs of a name and a vehicle.thrusters.Thruster"
+        return [Problem(key=THRUSTERS, found=short(thrusters), why=why, allowed=allowed)]
     problems = [
         Problem(
             key=f"{THRUSTERS}.{name}.direction_x",

@@ -34,6 +34,7 @@ import subzero
 from subzero import autopilot
 from subzero.external_force import MissingForce, Term
 from vehicle import Vehicle
+from vehicle.thrusters import Thruster
 
 ROWS = 5
 """So many results of a run are enough to see whether it stands."""
@@ -192,6 +193,9 @@ PAPER = dataclasses.replace(FIG6, scheme="paper")
 MODEL = subzero.Model.of(FIG6)
 TUNING = autopilot.tune(MODEL, speeds=(0.8, 1.2))
 SPEED = np.array([0.0, 1.0, 2.0])
+
+
+THRUSTER = subzero.Model.of(subzero.load_scenario("rov_hover")).vehicle.thruster_list[0]
 
 
 def fields_of(value: Any) -> dict[str, Any]:
@@ -426,7 +430,9 @@ def targets() -> list[Target]:
         Target("manoeuvre", {"name": "crash_stop", "size": 1.0, "speed": 1.0}, manoeuvred),
     ]  # fmt: skip
     for name, section in fields_of(MODEL.vehicle).items():
-        found.append(made(type(section), section, with_section(name)))
+        if name != "thrusters":  # a table of its own, below
+            found.append(made(type(section), section, with_section(name)))
+    found.append(made(Thruster, THRUSTER, lambda thruster: with_section("thrusters")((("one", thruster),))))
     return found
 
 
