@@ -149,7 +149,7 @@ tow_velocity_tangential       | m/s      | V_t         | tow point's speed along
 tow_velocity_normal           | m/s      | V_n         | tow point's speed along the cable's normal
 tow_velocity_binormal         | m/s      | V_b         | tow point's speed along the cable's binormal
 # energy since the start
-energy_propeller_work         | J        | W_p         | work of the propeller on the hull
+energy_propeller_work         | J        | W_p         | work of the propulsion (propeller, thrusters) on the hull
 energy_hull_loss              | J        | E_h         | energy lost in the water by hull and fins
 energy_cable_loss             | J        | E_c         | energy lost in the water by the cable
 energy_kinetic_change         | J        | \Delta E_k  | change of kinetic and potential energy

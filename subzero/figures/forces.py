@@ -90,7 +90,7 @@ def forces(run: xr.Dataset, title: Title) -> Figure:
 
 
 def energy(run: xr.Dataset, axes: Axes) -> None:
-    """Draw where the work of the propeller goes: the parts in colour, the work itself in ink."""
+    """Draw where the work of the propulsion goes: the parts in colour, the work itself in ink."""
     time = run["time"].values
     parts = {ENERGY_WORDS[part]: run[f"energy_{part}"].values for part in ENERGY_PARTS}
     parts = {words: np.nan_to_num(values) for words, values in parts.items() if np.isfinite(values).any()}
@@ -100,7 +100,7 @@ def energy(run: xr.Dataset, axes: Axes) -> None:
         colour = ENERGY_COLOURS[words]
         if np.abs(values).max() > seen or words == ENERGY_WORDS["residual"]:
             axes.plot(time, values, color=colour, linewidth=1.2, label=words)
-    axes.plot(time, work, color=style.INK, linewidth=1.4, label="propeller's work")
+    axes.plot(time, work, color=style.INK, linewidth=1.4, label="work of the propulsion")
     headline(axes, "Energy since the start")
     label(axes, None, "energy [J]")
     in_time(axes, {"": run})

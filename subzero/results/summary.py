@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from subzero.records.record import Record
 
 ENERGY_PARTS = ("hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term", "residual")
-"""Where the work of the propeller goes; their sum is ``energy_propeller_work``."""
+"""Where the work of the propulsion goes; their sum is ``energy_propeller_work``."""
 
 FORCE = ("cable_force_forward", "cable_force_starboard", "cable_force_down")
 MOMENT = ("cable_moment_roll", "cable_moment_pitch", "cable_moment_yaw")

@@ -24,7 +24,7 @@ SHOWN_CHANNELS = 12
 RUNS = ("tethered", "untethered")
 
 ENERGY_ROWS = {
-    "propeller_work_J": "work of the propeller [J]",
+    "propeller_work_J": "work of the propulsion [J]",
     "hull_loss_J": "  lost by hull and fins [J]",
     "cable_loss_J": "  lost by the cable [J]",
     "kinetic_change_J": "  kinetic and potential [J]",

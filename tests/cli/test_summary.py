@@ -73,7 +73,7 @@ def test_the_table_shows_the_runs_side_by_side(run):
         "path length [m] 17.00 17.00",
         "largest cable force [N] 5.0000 at 0.1 s 5.0000 at 0.1 s",
         "largest cable moment [N m] 2.0000 at 0.2 s 2.0000 at 0.2 s",
-        "work of the propeller [J] 200.000 200.000",
+        "work of the propulsion [J] 200.000 200.000",
         "unexplained share 2.5e-03 2.5e-03",
         "closure error [m] 1.0e-15 1.0e-15",
         "largest Courant number 0.50 0.50",
