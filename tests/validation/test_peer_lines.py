@@ -24,7 +24,9 @@ def test_a_hanging_line_has_the_pull_of_its_catenary():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("line", [lines.ON_FLOOR._replace(modulus=lines.HARD), lines.SECTIONS], ids=["floor", "two"])
+@pytest.mark.parametrize(
+    "line", [lines.ON_FLOOR._replace(modulus=lines.HARD), lines.SECTIONS], ids=["floor", "two"]
+)
 def test_the_lines_of_the_table_have_their_closed_form(line):
     errors = [lines.our_pull(line, segment) / lines.exact(line) - 1.0 for segment in (0.4, 0.1)]
     assert abs(errors[0]) < 2e-4
