@@ -65,7 +65,8 @@ LABELS = {
 class Modes:
     """The natural modes of a cable, from the lowest frequency on.
 
-    Where two have the same frequency, as of a straight cable, any mixture of their shapes is a mode, too.
+    Where two have the same frequency, as of a straight cable, any mixture of their shapes is a mode, too, and their
+    damping is shared out accordingly.
 
     Attributes:
         frequencies: natural frequencies, undamped (modes,). [Hz]
