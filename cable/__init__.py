@@ -33,6 +33,7 @@ from cable.current import Current
 from cable.drum import DrumProperties
 from cable.history import Equilibrium, History, Outcome
 from cable.hold import HoldError, hold
+from cable.modes import Modes
 from cable.moordyn_deck import Deck, DeckLine, read_deck
 from cable.properties import CableProperties
 from cable.pull_out import SCHEMES, pull_out, tow
@@ -58,6 +59,7 @@ __all__ = [
     "History",
     "HoldError",
     "Lumped",
+    "Modes",
     "MovingDrum",
     "MovingEnd",
     "Outcome",

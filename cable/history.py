@@ -13,6 +13,7 @@ import numpy as np
 
 from cable.current import Current
 from cable.doubts import SLACK_SHARE, above_surface, doubts_of
+from cable.modes import Modes, find_modes
 from cable.range_graph import dataset_of, figure_of
 from cable.sea_bed import SeaBed
 from cable.sections import AnyCable
@@ -284,6 +285,24 @@ class Equilibrium:
     def plot(self) -> Figure:
         """Return a matplotlib figure: the cable from the side, and its tension, declination and curvature."""
         return figure_of(self)
+
+    def modes(self, count: int = 6) -> Modes:
+        """Return the natural modes of lowest frequency about this equilibrium, its ends held: `cable.modes`.
+
+        >>> import cable
+        >>> string = cable.CableProperties(compliance=1e-6)
+        >>> taut = cable.hold([(0.0, 0.0, 0.0), (10.0, 0.0, 0.0)], 9.9, cable=string)
+        >>> formula = 0.5 * (taut.tensions[0] / string.virtual_mass_per_length / 9.9 / 10.0) ** 0.5      # stretched
+        >>> round(float(taut.modes().frequencies[0] / formula), 3)
+        1.0
+
+        Args:
+            count: how many; fewer where the cable has fewer.
+
+        Raises:
+            subzero.UserError: a slack cable, one that nothing brings back to its shape, or more than 1000 segments.
+        """
+        return find_modes(self, count)
 
     def __repr__(self) -> str:
         """Return the cable at rest in a few lines."""

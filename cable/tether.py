@@ -32,6 +32,7 @@ from cable.drum import LENGTH, DrumNumbers, DrumProperties
 from cable.drum_motion import PLACE, SETPOINT, VELOCITY
 from cable.history import Equilibrium
 from cable.hold import hold
+from cable.modes import Modes, find_modes
 from cable.moving_end.energy import LOSS, STORED
 from cable.moving_end.host_step import (
     EMPTY,
@@ -157,7 +158,7 @@ class Tether:
         """
         self._tried: tuple[float, np.ndarray, Drum, np.ndarray] | None = None
         self.cable = CableProperties() if cable is None else cable
-        self.current, self._owner = current_of(current), uuid4().hex
+        self.current, self._bed, self._owner = current_of(current), bed, uuid4().hex
         states = _checked_ends("Tether", ends, None)
         self._ends, two = len(states), len(states) == 2
         self._winch: Drum = DrumProperties() if not two else Brake() if winch is None else winch
@@ -366,6 +367,32 @@ class Tether:
         self._stepped.memory[:] = state.memory
         self._winch, self._tried = state.winch, None
 
+    def modes(self, count: int = 6) -> Modes:
+        """Return the natural modes of lowest frequency about where it is now, as if it were at rest: `cable.modes`.
+
+        Its ends are held, or, of a tether with one end, the tail is free. The water passes it as seen from the mean
+        velocity of its ends; what else the tether moves is left out.
+
+        Raises:
+            subzero.UserError: a slack tether, one that nothing brings back to its shape, or more than 1000 segments.
+        """
+        line, N = self._line, int(self._line.ends.count)
+        lengths = np.append(line.length[1:N], line.ends.last_length[NOW])
+        here = Equilibrium(
+            cable=self.cable,
+            current=_passing(self.current, self._places(), 0.0),
+            length=float(lengths.sum()),
+            shape=self.shape,
+            tensions=self.tension,
+            tow_force=self._on_first.copy(),
+            drum_force=-self._on_second,
+            segment_lengths=lengths,
+            segment_tensions=line.tension[NOW, 1 : N + 1].copy(),
+            steps=0,
+            bed=self._bed,
+        )
+        return find_modes(here, count, free_end=self._ends == 1)
+
     def __repr__(self) -> str:
         """Return where it stands in one line."""
         pulls = " and ".join(f"{np.linalg.norm(force):.4g} N" for force in self.forces)
@@ -553,8 +580,7 @@ def _towards(places: np.ndarray) -> np.ndarray:
 
 def _passing(current: Current, states: np.ndarray, rate: float) -> Current:
     """Return the current that a tether which goes on at its mean velocity sees."""
-    first, second = states[:, 1]
-    moving = 0.5 * (first + second + rate * _towards(states[:, 0]))
+    moving = 0.5 * (states[0, 1] + states[-1, 1] + rate * _towards(states[[0, -1], 0]))
     return replace(current, velocity=current.velocity - moving) if moving.any() else current
 
 

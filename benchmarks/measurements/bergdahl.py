@@ -21,6 +21,7 @@ import numpy as np
 import cable
 
 DATA = Path(__file__).with_name("bergdahl_chain.csv")
+WAVE_DATA = Path(__file__).with_name("bergdahl_waveform.csv")
 STEEL, DIAMETER = 7800.0, 0.0022
 CHAIN = cable.CableProperties(
     water_density=1000.0,
@@ -34,6 +35,8 @@ CHAIN = cable.CableProperties(
 )
 FLOOR = cable.SeaBed(depth=3.0, modulus=3e9, damping_ratio=1.0, axial_friction=0.3, lateral_friction=0.3)
 ENDS, LENGTH = ((32.554, 0.0, -0.3), (0.0, 0.0, 3.0)), 33.0
+WAVE = (1.25, 0.2)
+"""Period [s] and radius [m] of the condition whose tension over a turn is at hand: a snap in each turn."""
 GROWS, SETTLES, TURNS = 3, 7, 12
 """Turns in which the circle grows, after which the score begins, and in all."""
 
@@ -48,8 +51,27 @@ class Condition(NamedTuple):
 
 def conditions() -> list[Condition]:
     """Return the thirty conditions, with what was measured."""
-    lines = [line for line in DATA.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
-    return [Condition(*map(float, row.values())) for row in csv.DictReader(lines)]
+    return [Condition(*row) for row in _table(DATA)]
+
+
+def measured_wave() -> np.ndarray:
+    """Return time in the turn [s], mean and standard deviation of the measured pull [N] of `WAVE` (50, 3)."""
+    return np.array(_table(WAVE_DATA))
+
+
+def _table(path: Path) -> list[list[float]]:
+    """Return the rows of a file of numbers below a heading."""
+    lines = [line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    return [[float(number) for number in row.values()] for row in csv.DictReader(lines)]
+
+
+def in_phase(wave: np.ndarray) -> np.ndarray:
+    """Return a computed pull of one turn (steps,) at the measured times (50,), at the phase of least error."""
+    measured = measured_wave()[:, 1]
+    steps, count = np.arange(wave.size), measured.size
+    at = np.arange(count) * wave.size / count
+    shifted = [np.interp(at + shift, steps, wave, period=wave.size) for shift in steps]
+    return min(shifted, key=lambda pull: float(((pull - measured) ** 2).sum()))
 
 
 def circle(period: float, radius: float) -> Callable[[float], tuple[float, float, float]]:
@@ -66,8 +88,8 @@ def circle(period: float, radius: float) -> Callable[[float], tuple[float, float
     return velocity
 
 
-def largest_pull(condition: Condition, steps: int = 200, segments: int = 82, turns: int = TURNS) -> float:
-    """Return the mean of the largest pulls in the turns that count. [N]"""
+def pulls(condition: Condition, steps: int = 200, segments: int = 82, turns: int = TURNS) -> np.ndarray:
+    """Return the pull at the upper end in each turn (turns, steps). [N]"""
     period, segment = condition.period, LENGTH / segments
     start = cable.hold(ENDS, LENGTH, cable=CHAIN, segment_length=segment, bed=FLOOR)
     scheme = cable.MovingEnd(time_step=period / steps, tolerance=1e-6)
@@ -75,11 +97,26 @@ def largest_pull(condition: Condition, steps: int = 200, segments: int = 82, tur
     run = cable.pull_out(path, turns * period, drum=cable.Brake(), start=start, scheme=scheme)
     if not run.outcome.completed:
         raise RuntimeError(run.outcome.message)
-    pulls = np.linalg.norm(run.tow_force, axis=1)[1:].reshape(turns, steps)
-    return float(pulls[min(SETTLES, turns - 1) :].max(axis=1).mean())
+    return np.linalg.norm(run.tow_force, axis=1)[1:].reshape(turns, steps)
+
+
+def largest_pull(condition: Condition, steps: int = 200, segments: int = 82, turns: int = TURNS) -> float:
+    """Return the mean of the largest pulls in the turns that count. [N]"""
+    wave = pulls(condition, steps, segments, turns)
+    return float(wave[min(SETTLES, turns - 1) :].max(axis=1).mean())
+
+
+def errors(computed: np.ndarray) -> np.ndarray:
+    """Return the relative errors of all conditions (30,)."""
+    return computed / np.array([condition.measured for condition in conditions()]) - 1.0
 
 
 def mean_error(computed: np.ndarray) -> float:
-    """Return the mean of the sizes of the relative errors of all conditions."""
-    measured = np.array([condition.measured for condition in conditions()])
-    return float(np.abs(computed / measured - 1.0).mean())
+    """Return the mean of their sizes."""
+    return float(np.abs(errors(computed)).mean())
+
+
+def pull_at_rest(segments: int = 82) -> float:
+    """Return the force at the upper end of the chain at rest. [N]"""
+    rest = cable.hold(ENDS, LENGTH, cable=CHAIN, segment_length=LENGTH / segments, bed=FLOOR)
+    return float(np.linalg.norm(rest.tow_force))

@@ -36,7 +36,7 @@ from scipy.optimize import brentq
 import cable
 import subzero
 from benchmarks.cable import DURATION, dive
-from benchmarks.peers import fsolve, moordyn_wire, numpy_hull
+from benchmarks.peers import fsolve, lines, moordyn_wire, numpy_hull
 from vehicle import free_run, initial_state
 
 
@@ -217,6 +217,69 @@ def at_rest(bench):
         yield beside("catenary, ms in all", f"CableDyn {version('cabledyn')}", theirs, ours)
 
 
+LINES = {"chain on a floor": lines.ON_FLOOR, "wire and chain": lines.SECTIONS}
+
+
+def lines_at_rest(bench):
+    """Yield rows: a chain on a hard floor, and a line of two sections, found from nothing."""
+    for name, line in LINES.items():
+        line = line._replace(modulus=lines.HARD if line.modulus else 0.0)
+        exact, ours = lines.exact(line), []
+
+        def measured(setting, pull, exact=exact):
+            found, cost = bench.timed(pull, 1.0)
+            return Measured(setting=setting, error=float(abs(found / exact - 1.0)), cost=cost)
+
+        for segment in (2.0, 1.0, 0.9, 0.8, 0.5, 0.4, 0.2, 0.1, 0.05):
+            hang = partial(lines.our_pull, line, segment)
+            ours.append(measured(f"segments of {segment:g} m", hang))
+        for peer, pull in (("cabledyn", lines.cabledyn_rest), ("moordyn", lines.moordyn_rest)):
+            for count in bench.some((20, 80)) if find_spec(peer) else ():
+                theirs = measured(f"{count} elements", partial(pull, line, lines.divided(line, count)))
+                yield beside(f"{name}, at rest, ms in all", f"{NAMES[peer]} {version(peer)}", theirs, ours)
+        if find_spec("moorpy"):
+            theirs = measured("closed form", partial(lines.moorpy_rest, line))
+            yield beside(f"{name}, at rest, ms in all", f"MoorPy {version('moorpy')}", theirs, ours)
+
+
+NAMES = {"moordyn": "MoorDyn", "cabledyn": "CableDyn", "moorpy": "MoorPy"}
+LINE_GRIDS = (
+    (2.0, 0.2), (1.0, 0.1), (1.0, 0.05), (0.5, 0.05), (0.4, 0.025), (0.2, 0.02), (0.2, 0.01), (0.1, 0.01), (0.1, 0.007),
+    (0.1, 0.005),
+)  # fmt: skip
+
+
+def off_by(run, exact):
+    """Return the largest error of a force (time, force) after the start, of the largest force."""
+    (time, force), (times, forces) = run, exact
+    there = np.stack([np.interp(time, times, forces[:, i]) for i in range(3)], axis=1)
+    error = np.linalg.norm(force - there, axis=1)[time > 0.5].max()
+    return float(error / np.linalg.norm(forces, axis=1).max())
+
+
+def led_lines(bench):
+    """Yield rows: the same two lines, their first ends led round a circle, with their search for rest."""
+    for name, line in LINES.items():
+        exact, ours = lines.our_run(line, 0.05, 0.0025), []
+
+        def measured(setting, run, exact=exact):
+            found, cost = bench.timed(run, lines.DURATION_S)
+            return Measured(setting=setting, error=off_by(found, exact), cost=cost)
+
+        ours += [measured(named(*grid), partial(lines.our_run, line, *grid)) for grid in LINE_GRIDS]
+        for count in bench.some((20, 40, 80)) if find_spec("moordyn") else ():
+            theirs = measured(
+                f"{count} segments", partial(lines.moordyn_run, line, lines.divided(line, count))
+            )
+            yield beside(f"{name}, led in a circle", f"MoorDyn {version('moordyn')}", theirs, ours)
+        for count, step in (
+            bench.some(((20, 0.05), (40, 0.02), (80, 0.02), (80, 0.005))) if find_spec("cabledyn") else ()
+        ):
+            run = partial(lines.cabledyn_run, line, lines.divided(line, count), step)
+            theirs = measured(f"{count} elements, steps of {step:g} s", run)
+            yield beside(f"{name}, led in a circle", f"CableDyn {version('cabledyn')}", theirs, ours)
+
+
 START = initial_state(velocity=(0.5, 0.0, 0.0, 0.0, 0.0, 0.0))
 COMMAND = np.array([25.0, 0.05, 0.0, 0.0])
 TURN_S = 10.0
@@ -294,7 +357,7 @@ def cells(row):
 def machine():
     """Return what it was measured on."""
     packages = {}
-    for name in ("numpy", "scipy", "numba", "moordyn", "cabledyn"):
+    for name in ("numpy", "scipy", "numba", "moordyn", "cabledyn", "moorpy"):
         try:
             packages[name] = version(name)
         except PackageNotFoundError:
@@ -318,7 +381,7 @@ def main():
     bench, rows, about = Bench(asked.repeats, asked.quick), [], machine()
     print(f"{about['cores']} cores, load {about['load']:.1f} before this began, medians of {asked.repeats}\n")
     print(f"| {' | '.join(HEAD)} |\n" + "|---" * len(HEAD) + "|")
-    for case in (towed, held, paid_out, at_rest, hulls):
+    for case in (towed, held, paid_out, at_rest, lines_at_rest, led_lines, hulls):
         for row in case(bench):
             rows.append(row)
             print(f"| {' | '.join(cells(row))} |", flush=True)
@@ -335,6 +398,7 @@ def main():
 NEEDED = {
     "MoorDyn": ("moordyn", "pip install 'subzero-auv[peers]'"),
     "CableDyn": ("cabledyn", "pip install 'subzero-auv[peers]'"),
+    "MoorPy": ("moorpy", "pip install 'subzero-auv[peers]'"),
     "PythonVehicleSimulator": ("python_vehicle_simulator", "from its repository"),
 }
 
