@@ -45,7 +45,7 @@ ROUGHENINGS, SETTLED = 20, 1e-7
 """How often friction is taken again from the tension that it leaves, until it changes by less than this share."""
 FORCES = frozenset(
     {"mass", "added_mass", "weight", "retardation", "tangential_drag", "normal_drag", "bending_stiffness"}
-    | {"bed_stiffness", "bed_damping"}
+    | {"bed_stiffness", "bed_damping", "mass_along"}
 )
 """Numbers of a cable that forces are proportional to."""
 TAUT = 1.0 - 1e-9
@@ -145,12 +145,12 @@ def _sink_onto(
     rough = bed.axial_friction if is_laid else 0.0
     deepest = float(bed.below(line.position[NOW, :nodes] + np.asarray(line.ends.origin)).max())
     soft = min(max(abs(c.weight), WEIGHTLESS) / max(deepest, c.bed_rounding), hard)
-    stiff = c.section[:, -2].copy() if "section" in c.names else 0.0
+    stiff = c.section[:, COLUMNS.index("bed_stiffness")].copy() if "section" in c.names else 0.0
     stages = int(np.ceil(np.log(hard / soft) / np.log(STIFFER)))
     for k, c.bed_stiffness in enumerate(hard * STIFFER ** -np.arange(stages, -1.0, -1.0)):
         line.tension[:] *= scale if k > 0 else 1.0
         if "section" in c.names:
-            c.section[:, -2] = stiff * c.bed_stiffness / hard
+            c.section[:, COLUMNS.index("bed_stiffness")] = stiff * c.bed_stiffness / hard
         steps, scale = _come_to_rest(line, water, c, brake, work, scale)
         if steps < 0:
             return steps, scale

@@ -6,6 +6,7 @@ Symbols are those of Feng & Allen (2004), section 2.2; defaults are their Table 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cache
 from math import isfinite, sqrt
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +23,10 @@ GRAVITY = 9.81
 
 
 class CableNumbers(Record):
-    """The cable as compiled code sees it: m, ρA, w_c, e, B e, the drag constants ½ρdπC_t and ½ρdC_n."""
+    """The cable as compiled code sees it: m, ρA C_a, w_c, e, B e, the drag constants ½ρdπC_t and ½ρdC_n.
+
+    With an added mass along the cable, `mass` is m + ρA C_at and `added_mass` ρA (C_a − C_at).
+    """
 
     mass: float
     added_mass: float
@@ -39,6 +43,12 @@ class StiffCableNumbers(CableNumbers):
     bending_stiffness: float
 
 
+class AlongCableNumbers(CableNumbers):
+    """The same of a cable with added mass along it, with ρA C_at [kg/m]."""
+
+    mass_along: float
+
+
 class LaidCableNumbers(CableNumbers):
     """The same of a cable above a sea bed: its plane, k, c, δ, μ and κ, see `cable.sea_bed`."""
 
@@ -53,11 +63,11 @@ class LaidCableNumbers(CableNumbers):
     is_at_rest: bool
 
 
-class SectionedCableNumbers(LaidCableNumbers):
+class SectionedCableNumbers(LaidCableNumbers, AlongCableNumbers):
     """The same of a line of sections and bodies: always of one section, and all of them, see `cable.sections`.
 
     Attributes:
-        section: numbers of each (sections, 9), `sections.COLUMNS`, then k and c of the bed.
+        section: numbers of each (sections, columns), `sections.COLUMNS`.
         section_end: where each ends, from the tow point; the last is endless (sections,). [m]
         section_now, section_segment, section_along: the section that the record describes, of which segment, and
             where that ends. [-], [-], [m]
@@ -76,10 +86,12 @@ class SectionedCableNumbers(LaidCableNumbers):
     body_count: int
 
 
-class StiffLaidCableNumbers(LaidCableNumbers):
-    """The same of a cable that resists bending, with EI [N m²]."""
-
-    bending_stiffness: float
+@cache
+def numbers_of(kinds: tuple[type[CableNumbers], ...]) -> type[CableNumbers]:
+    """Return the class of the numbers of a cable that is of several kinds at once."""
+    if len(kinds) < 2:
+        return kinds[0] if kinds else CableNumbers
+    return type("".join(kind.__name__.removesuffix("CableNumbers") for kind in kinds), kinds, {})
 
 
 ABOVE_ZERO = ("water_density", "mass_per_length", "cross_section_area", "diameter")
@@ -98,6 +110,7 @@ class CableProperties:
         tangential_drag_coefficient: C_t, on the wetted surface π d. [-]
         normal_drag_coefficient: C_n, on the projected area d. [-]
         added_mass_coefficient: C_a, added mass across the cable as a share of ρA; 1 for a round cylinder. [-]
+        tangential_added_mass_coefficient: C_at, the same along it; 0 for a smooth cable, some 0.5 for chain. [-]
         compliance: e = 1/(E A); 0 is an inextensible cable. [1/N]
         internal_damping: B, of stretch, T = E A ε + B dε/dt; see `moving_end.slack_law`. [N s]
         bending_stiffness: E I; see `moving_end.bending`. [N m²]
@@ -115,6 +128,7 @@ class CableProperties:
     tangential_drag_coefficient: float = 0.01
     normal_drag_coefficient: float = 1.0
     added_mass_coefficient: float = 1.0
+    tangential_added_mass_coefficient: float = 0.0
     compliance: float = 0.0
     internal_damping: float = 0.0
     bending_stiffness: float = 0.0
@@ -166,9 +180,10 @@ class CableProperties:
 
     def numbers(self, bed: SeaBed | None = None) -> CableNumbers:
         """Return the plain numbers that compiled code takes, of a cable that may bend, above a bed if there is one."""
+        along = self.tangential_added_mass_coefficient * self.water_density * self.cross_section_area
         values: dict[str, Any] = {
-            "mass": self.mass_per_length,
-            "added_mass": self.added_mass_coefficient * self.water_density * self.cross_section_area,
+            "mass": self.mass_per_length + along,
+            "added_mass": self.added_mass_coefficient * self.water_density * self.cross_section_area - along,
             "weight": self.weight_in_water,
             "compliance": self.compliance,
             "retardation": self.internal_damping * self.compliance,
@@ -179,16 +194,13 @@ class CableProperties:
             raise BadValueError(
                 "CableProperties: its numbers are so large that masses, weights or drags are not finite."
             )
+        special: dict[type[CableNumbers], dict[str, Any]] = {}
         if self.bending_stiffness > 0.0:
-            values["bending_stiffness"] = self.bending_stiffness
-        kind = KINDS[self.bending_stiffness > 0.0, bed is not None]
-        return kind(**values | (bed.numbers(self) if bed is not None else {}))
-
-
-KINDS: dict[tuple[bool, bool], type[CableNumbers]] = {
-    (False, False): CableNumbers,
-    (True, False): StiffCableNumbers,
-    (False, True): LaidCableNumbers,
-    (True, True): StiffLaidCableNumbers,
-}
-"""Whether a cable resists bending, and whether there is a bed → its numbers."""
+            special[StiffCableNumbers] = {"bending_stiffness": self.bending_stiffness}
+        if along > 0.0:
+            special[AlongCableNumbers] = {"mass_along": along}
+        if bed is not None:
+            special[LaidCableNumbers] = bed.numbers(self)
+        for more in special.values():
+            values |= more
+        return numbers_of(tuple(special))(**values)

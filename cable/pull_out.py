@@ -22,6 +22,7 @@ from cable.task import (
     EQUILIBRIUM,
     EVERYTHING,
     INTERNAL_DAMPING,
+    MASS_ALONG,
     SEA_BED,
     SECTIONS,
     Drum,
@@ -80,7 +81,7 @@ SCHEMES: Mapping[str, Scheme] = {
         Lumped(),
         _lumped_pull_out,
         _lumped_tow,
-        EVERYTHING - {EQUILIBRIUM, INTERNAL_DAMPING, SEA_BED, SECTIONS},
+        EVERYTHING - {EQUILIBRIUM, INTERNAL_DAMPING, SEA_BED, SECTIONS, MASS_ALONG},
     ),
 }
 """Name → the scheme; the first is the default, and "paper" the usable reading of the paper's."""
@@ -132,12 +133,7 @@ def pull_out(
     """
     row, options = _chosen(scheme)
     task = PullOut.of(tow_velocity, duration, cable=cable, drum=drum, current=current, start=start, bed=bed)
-    missing = [what for what in task.asks_for() if what not in row.knows]
-    if missing:
-        able = [repr(name) for name, other in SCHEMES.items() if set(task.asks_for()) <= other.knows]
-        raise BadValueError(
-            f"scheme '{options.name}' does not know {' and '.join(missing)}; use {' or '.join(able)}."
-        )
+    _refuse_unknown(task, row, options)
     return row.pull_out(task, options)
 
 
@@ -191,9 +187,18 @@ def tow(
         drogue_drag_area=drogue_drag_area,
         bed=bed,
     )
-    if bed is not None and SEA_BED not in row.knows:
-        raise BadValueError(f"scheme '{options.name}' does not know {SEA_BED}; use 'moving_end'.")
+    _refuse_unknown(task, row, options)
     return row.tow(task, options)
+
+
+def _refuse_unknown(task: PullOut | Tow, row: Scheme, options: Options) -> None:
+    """Raise an error for features that a scheme does not know."""
+    missing = [what for what in task.asks_for() if what not in row.knows]
+    if missing:
+        able = [repr(name) for name, other in SCHEMES.items() if set(task.asks_for()) <= other.knows]
+        raise BadValueError(
+            f"scheme '{options.name}' does not know {' and '.join(missing)}; use {' or '.join(able)}."
+        )
 
 
 def _chosen(scheme: object) -> tuple[Scheme, Options]:

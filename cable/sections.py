@@ -33,8 +33,11 @@ from subzero.errors import BadValueError, checked, short, suggestion
 
 MOST = 16
 """So many sections, and so many bodies, a line can have: compiled code keeps space for them."""
-COLUMNS = ("mass", "added_mass", "weight", "compliance", "retardation", "tangential_drag", "normal_drag")
-"""Columns of `SectionedCableNumbers.section`; on a bed, k and c follow."""
+COLUMNS = (
+    *("mass", "added_mass", "weight", "compliance", "retardation", "tangential_drag", "normal_drag"),
+    *("bed_stiffness", "bed_damping", "mass_along"),
+)
+"""Columns of `SectionedCableNumbers.section`."""
 NO_BED = SeaBed(depth=1e9)
 
 
@@ -227,7 +230,7 @@ class SectionedCable:
     def numbers(self, bed: SeaBed | None = None) -> CableNumbers:
         """Return the plain numbers that compiled code takes; those of the first section are selected."""
         rows, ends, points, places = (
-            np.zeros((MOST, 9)),
+            np.zeros((MOST, len(COLUMNS))),
             np.full(MOST, np.inf),
             np.zeros((MOST, 5)),
             np.zeros(MOST),
@@ -235,7 +238,7 @@ class SectionedCable:
         ground = NO_BED if bed is None else bed
         for k, section in enumerate(self.sections):
             c: Any = section.cable.numbers(ground)
-            rows[k] = [*(c[name] for name in COLUMNS), c.bed_stiffness, c.bed_damping]
+            rows[k] = [c[name] if name in c.names else 0.0 for name in COLUMNS]
         ends[: len(self.sections) - 1] = np.cumsum([section.length for section in self.sections])[:-1]
         half = 0.5 * self.water_density
         for k, body in enumerate(self.bodies):
@@ -246,8 +249,7 @@ class SectionedCable:
         first = replace(self.sections[0].cable, diameter=self.diameter)
         values: dict[str, Any] = {name: rows[0, k] for k, name in enumerate(COLUMNS)}
         return SectionedCableNumbers(
-            **values,
-            **ground.numbers(first) | {"bed_stiffness": rows[0, 7], "bed_damping": rows[0, 8]},
+            **ground.numbers(first) | values,
             section=rows,
             section_end=ends,
             section_now=0,

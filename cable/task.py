@@ -32,8 +32,10 @@ WET_LENGTH, EQUILIBRIUM = "cable in the water at the start", "a start from cable
 INTERNAL_DAMPING = "internal damping of the cable"
 SEA_BED = "a sea bed"
 SECTIONS = "a cable of several sections"
+MASS_ALONG = "added mass along the cable"
 EVERYTHING = frozenset(
     {WINCH, MOVING_DRUM, UNEVEN_CURRENT, WET_LENGTH, EQUILIBRIUM, INTERNAL_DAMPING, SEA_BED, SECTIONS}
+    | {MASS_ALONG}
 )
 """Features that a task may ask for beyond a free drum on the shore, uniform water and no cable at the start."""
 
@@ -129,10 +131,8 @@ class PullOut:
             WET_LENGTH: not isinstance(self.start, Equilibrium) and self.start > 0.0,
             EQUILIBRIUM: isinstance(self.start, Equilibrium),
             INTERNAL_DAMPING: self.cable.internal_damping > 0.0,
-            SEA_BED: self.bed is not None,
-            SECTIONS: isinstance(self.cable, SectionedCable),
         }
-        return [what for what, is_asked in asked.items() if is_asked]
+        return [what for what, is_asked in asked.items() if is_asked] + _asked_of(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -184,10 +184,24 @@ class Tow:
             bed=bed,
         )
 
+    def asks_for(self) -> list[str]:
+        """Return the features of `EVERYTHING` that it asks for."""
+        return _asked_of(self)
+
     @property
     def tail_drag(self) -> float:
         """½ρC_dA of the drogue. [kg/m]."""
         return 0.5 * self.cable.water_density * self.drogue_drag_area
+
+
+def _asked_of(task: PullOut | Tow) -> list[str]:
+    """Return the features that both kinds of tasks can ask for."""
+    asked = {
+        SEA_BED: task.bed is not None,
+        SECTIONS: isinstance(task.cable, SectionedCable),
+        MASS_ALONG: getattr(task.cable, "tangential_added_mass_coefficient", 0.0) > 0.0,
+    }
+    return [what for what, is_asked in asked.items() if is_asked]
 
 
 def checked_duration(value: float) -> float:

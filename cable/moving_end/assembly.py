@@ -45,6 +45,7 @@ from cable.moving_end.segment_load import (
     Load,
     differentiate_load,
     evaluate_load,
+    mass_along,
     measured_chord,
     take_segment,
 )
@@ -359,6 +360,7 @@ def add_influx(line: Line, c: CableNumbers, work: Load) -> None:
     # along t: of the added mass only the water that passes the drum is left.
     for i in range(3):
         entering = c.mass * line.velocity[NEW, N, i] - c.added_mass * (J[i] - Jt * t[i])
+        entering -= mass_along(line, c) * line.water[NEW, N, i]
         line.load[N, i] -= U * entering
 
 
@@ -375,6 +377,7 @@ def differentiate_influx(
     stretch = 0.5 * c.compliance / (1.0 + c.compliance * T)
     for i in range(3):
         entering = c.mass * line.velocity[NEW, N, i] - c.added_mass * (J[i] - Jt * t[i])
+        entering -= mass_along(line, c) * line.water[NEW, N, i]
         by_far[i, 0] = length * stretch * work.drag[i]
         by_far[i, 1] = work.q[i] - dU * entering - U * c.mass * (U / length - dU) * d[i] / length
         by_far[i, 1] -= fading * (length * work.q_tt[i] - 2.0 * U * c.added_mass * Jt * t[i])

@@ -154,8 +154,9 @@ def steady_tow(line: Line, c: SectionedCableNumbers, U: np.ndarray, tail_drag: f
             )
             load = length * (c.weight * down - drag)
             middle = force + 0.5 * load
-            t = t + 0.5 * (middle / max(float(np.linalg.norm(middle)), 1e-30) - t)
-            t /= np.linalg.norm(t)
+            pulled = middle / max(float(np.linalg.norm(middle)), 1e-30)
+            t = t + 0.5 * (pulled - t)
+            t = t / np.linalg.norm(t) if t.any() else pulled  # none: it points against the pull
         T = float(np.linalg.norm(middle))
         line.tension[:, j], line.node_tension[j] = T, float(np.linalg.norm(force))
         x[j - 1] = x[j] - length * (1.0 + c.compliance * T) * t

@@ -25,7 +25,7 @@ import numpy as np
 from cable.moving_end.bending import bending_energy
 from cable.moving_end.composition import body_flow
 from cable.moving_end.contact import power_to_bed
-from cable.moving_end.segment_load import Load, evaluate_load, measured_chord, take_segment
+from cable.moving_end.segment_load import Load, evaluate_load, mass_along, measured_chord, take_segment
 from cable.moving_end.slack_law import KNOWN
 from cable.moving_end.state import BEFORE, NOW, Line, select_section
 from cable.properties import CableNumbers
@@ -65,7 +65,7 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
         energy += 0.5 * length * stored
         sunk += length * c.weight * (V[2] - J[2])
         added -= c.added_mass * work.along * turn * length / work.chord_length
-        carried += length * c.mass * _carried(line, j)
+        carried += length * (c.mass - mass_along(line, c)) * _carried(line, j)
     lost, held, fallen = body_flow(line, c)
     out[LOSS], out[STORED], out[GRAVITY_WORK], out[ADDED_MASS] = (
         loss + lost,

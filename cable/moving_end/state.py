@@ -345,7 +345,7 @@ def find_section(line: Line, c: SectionedCableNumbers, j: int) -> None:
     row, c.section_now = c.section[k], k
     c.mass, c.added_mass, c.weight, c.compliance = row[0], row[1], row[2], row[3]
     c.retardation, c.tangential_drag, c.normal_drag = row[4], row[5], row[6]
-    c.bed_stiffness, c.bed_damping = row[7], row[8]
+    c.bed_stiffness, c.bed_damping, c.mass_along = row[7], row[8], row[9]
 
 
 @inner

@@ -170,6 +170,24 @@ def test_bending_has_its_jacobian_right_too(segments):
     assert_allclose(analytic / largest, numeric / largest, rtol=0, atol=2e-6)
 
 
+@pytest.mark.parametrize("mode", [TURNING, STANDING], ids=["turning", "standing"])
+def test_added_mass_along_has_its_jacobian_right_too(mode):
+    c = CableProperties(
+        mass_per_length=0.02,
+        compliance=0.05,
+        diameter=0.01,
+        cross_section_area=1e-4,
+        tangential_added_mass_coefficient=0.5,
+    ).numbers()
+    line, work = bent_line(4, mode, 6, c=c)
+    weights = backward_weights.py_func(0.1, 0.07)
+    numeric, _ = differences(line, work, weights, c)
+    analytic = dense(line)
+    numeric[-2:] = analytic[-2:]
+    largest = np.abs(analytic).max(axis=1, keepdims=True)
+    assert_allclose(analytic / largest, numeric / largest, rtol=0, atol=2e-6)
+
+
 @pytest.mark.parametrize("friction", [0.0, 0.2, 50.0], ids=["smooth", "slides", "sticks"])
 def test_a_sea_bed_has_its_jacobian_right_too(friction):
     """All nodes are in the ground."""
