@@ -8,7 +8,8 @@ middle. With U = V − J, U_t = U·t, U_⊥ = U − U_t t and the projection P =
 
 whose components along t, n, b are the six scalar equations of Feng & Allen (2004) as re-derived in
 `docs/theory.md`. With added mass along the cable, too, p = m V + ρA (C_a U_⊥ + C_at U_t t), which is computed as
-(m + ρA C_at) V + ρA (C_a − C_at) U_⊥ − ρA C_at J: the first two have the form above. No angle appears, so no direction is singular, and a turned motion gives turned forces.
+(m + ρA C_at) V + ρA (C_a − C_at) U_⊥ − ρA C_at J: the first two have the form above. No angle appears, so no direction
+is singular, and a turned motion gives turned forces.
 
 `evaluate_load` fills q = a₀ p + D − w_c k, where a₀ is the weight of the newest value in the time derivative
 (`bdf2`), and `differentiate_load` ∂q/∂V and ∂q/∂d: all that Newton's method needs from the physics.
