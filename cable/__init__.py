@@ -19,9 +19,9 @@ F_c            force on the vehicle                 N         (12), f_1 − ½Q_
 α, β           angles of the paper's local frame    rad       (3)-(4)                            feng_allen/equation7
 
 What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`properties`, `sections`, `sea_bed`,
-`drum`, `winch`, `current`, `waves`, `schemes`) and give (`history`); and `tether.Tether`, which another simulator steps,
-in the default formulation. A call makes a `task` of it, which one of three formulations computes; they share nothing
-else:
+`clamps`, `drum`, `winch`, `current`, `waves`, `schemes`) and give (`history`); and `tether.Tether`, which another
+simulator steps, in the default formulation. A call makes a `task` of it, which one of three formulations computes; they
+share nothing else:
 
 * `moving_end`, the default: balances are vectors (their equivalence with the paper's six scalar equations, whose signs
   are derived again, is in `feng_allen.equation7` and tested), time is differenced backward, and a step is solved by
@@ -30,6 +30,7 @@ else:
 * `feng_allen`: the paper's angles, in its own scheme (20)-(26) as printed, and in a box scheme of second order.
 """
 
+from cable.clamps import Clamps
 from cable.current import Current
 from cable.drum import DrumProperties
 from cable.history import Equilibrium, History, Outcome
@@ -50,6 +51,7 @@ __all__ = [
     "Body",
     "Brake",
     "CableProperties",
+    "Clamps",
     "ConstantTension",
     "Current",
     "Deck",

@@ -16,6 +16,7 @@ from subzero.errors import BadValueError, checked
 from subzero.jit import Record
 
 if TYPE_CHECKING:
+    from cable.clamps import Clamps
     from cable.sea_bed import SeaBed
 
 GRAVITY = 9.81
@@ -43,6 +44,12 @@ class StiffCableNumbers(CableNumbers):
     bending_stiffness: float
 
 
+class ClampedCableNumbers(StiffCableNumbers):
+    """The same with clamped ends: their tangents (2, 3), zeros at a hinge."""
+
+    clamp: np.ndarray
+
+
 class AlongCableNumbers(CableNumbers):
     """The same of a cable with added mass along it, with ρA C_at [kg/m]."""
 
@@ -63,6 +70,21 @@ class LaidCableNumbers(CableNumbers):
     is_at_rest: bool
 
 
+class FloatingCableNumbers(AlongCableNumbers):
+    """The same of a cable in water with a free surface, see `moving_end.surface`.
+
+    Attributes:
+        surface_level: depth of the surface. [m]
+        whole: m, ρA (C_a − C_at), ρA C_at, ½ρπdC_t, ½ρdC_n, ρAg and d of the segment that the record describes, if it
+            were all in water (7,).
+        softness: radii are so many times as large; 1 but in a search for rest.
+    """
+
+    surface_level: float
+    whole: np.ndarray
+    softness: float
+
+
 class SectionedCableNumbers(LaidCableNumbers, AlongCableNumbers):
     """The same of a line of sections and bodies: always of one section, and all of them, see `cable.sections`.
 
@@ -71,7 +93,8 @@ class SectionedCableNumbers(LaidCableNumbers, AlongCableNumbers):
         section_end: where each ends, from the tow point; the last is endless (sections,). [m]
         section_now, section_segment, section_along: the section that the record describes, of which segment, and
             where that ends. [-], [-], [m]
-        body: m, ρC_aV, weight in water, ½ρC_dA, ½ρC_LA of each body (bodies, 5).
+        body: m, ρC_aV, weight in water, ½ρC_dA, ½ρC_LA, ρVg of each body (bodies, 6).
+        body_radius: of a sphere of its volume (bodies,). [m]
         body_place: distance from the tow point (bodies,). [m]
         body_count: how many there are.
     """
@@ -82,6 +105,7 @@ class SectionedCableNumbers(LaidCableNumbers, AlongCableNumbers):
     section_segment: int
     section_along: float
     body: np.ndarray
+    body_radius: np.ndarray
     body_place: np.ndarray
     body_count: int
 
@@ -161,6 +185,11 @@ class CableProperties:
         return (self.mass_per_length - self.water_density * self.cross_section_area) * GRAVITY
 
     @property
+    def buoyancy(self) -> float:
+        """ρAg. [N/m]."""
+        return self.water_density * self.cross_section_area * GRAVITY
+
+    @property
     def tangential_drag(self) -> float:
         """½ρπdC_t, the drag per metre at 1 m/s along the cable: 0.03927 for Table 1. [N s²/m³]."""
         pi = 3.141592653589793
@@ -178,8 +207,10 @@ class CableProperties:
         ratio = abs(self.weight_in_water) / (2.0 * self.normal_drag * speed * speed)
         return acos(sqrt(1.0 + ratio * ratio) - ratio)
 
-    def numbers(self, bed: SeaBed | None = None) -> CableNumbers:
-        """Return the plain numbers that compiled code takes, of a cable that may bend, above a bed if there is one."""
+    def numbers(
+        self, bed: SeaBed | None = None, clamps: Clamps | None = None, surface: float | None = None
+    ) -> CableNumbers:
+        """Return the plain numbers that compiled code takes: clamped, above a bed, below a surface."""
         along = self.tangential_added_mass_coefficient * self.water_density * self.cross_section_area
         values: dict[str, Any] = {
             "mass": self.mass_per_length + along,
@@ -195,9 +226,23 @@ class CableProperties:
                 "CableProperties: its numbers are so large that masses, weights or drags are not finite."
             )
         special: dict[type[CableNumbers], dict[str, Any]] = {}
-        if self.bending_stiffness > 0.0:
+        if clamps is not None:
+            special[ClampedCableNumbers] = clamps.numbers(self)
+        elif self.bending_stiffness > 0.0:
             special[StiffCableNumbers] = {"bending_stiffness": self.bending_stiffness}
-        if along > 0.0:
+        if surface is not None:
+            parts = (
+                self.mass_per_length,
+                values["added_mass"],
+                along,
+                self.tangential_drag,
+                self.normal_drag,
+            )
+            whole = np.array([*parts, self.buoyancy, self.diameter])
+            level = checked("", "surface", surface, unit="m, its depth")
+            floating = {"surface_level": level, "whole": whole, "softness": 1.0, "mass_along": along}
+            special[FloatingCableNumbers] = floating
+        elif along > 0.0:
             special[AlongCableNumbers] = {"mass_along": along}
         if bed is not None:
             special[LaidCableNumbers] = bed.numbers(self)
