@@ -39,7 +39,7 @@ class Clamps:
     second: Sequence[float] | np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        """Raise an error for what is no direction; keep unit vectors."""
+        """Raise an error if a field is no direction; keep unit vectors."""
         for name in ("first", "second"):
             given = getattr(self, name)
             if given is None:

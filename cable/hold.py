@@ -99,7 +99,7 @@ def hold(
         start: node positions (any number, 3) to start the search from; a catenary under weight and drag when not given.
         bed: the sea bed, in the axes of `ends`; none when not given.
         clamps: directions in which it leaves its ends, if it has a bending stiffness; hinges when not given.
-        surface: depth of a free surface, in the axes of `ends`: what is above it is in the air, what floats, floats;
+        surface: depth of a free surface, in the axes of `ends`: above it is air, and a light cable floats;
             water everywhere when not given. [m]
 
     Raises:

@@ -1,11 +1,11 @@
-"""The free surface in the balances: what is above it has its weight in air, and neither drag nor added mass.
+"""The free surface in the balances: above it a cable has its weight in air, and neither drag nor added mass.
 
 A segment's water acts by its wetted share σ: the record of a floating cable always describes one segment at one level
 of time (`state.select_section`, `wet_at_new`), with added mass, drag and the mass that is carried along it times σ. Its
-weight is that in water, and what its dry part is heavier, ρAg δ, is added here to the balances of both ends as each
-carries it (`wetting`): the gradient of an energy. Of a body, a sphere of its volume, likewise. With the water's momentum
-σρA U that which is wetted comes in and goes out (a slam as that of von Kármán); the ledger has it as `wetted_power`.
-What a cable in water everywhere compiles of this is nothing.
+weight is that in water; what its dry part is heavier, ρAg δ, is added here to the balances of both ends as each carries
+it (`wetting`): the gradient of an energy. Of a body, a sphere of its volume, likewise. With the momentum σρA U of the
+water, that which is wetted comes in and goes out (a slam as that of von Kármán); `wetted_power` is its part in the
+ledger. What a cable in water everywhere compiles of this is nothing.
 """
 
 from __future__ import annotations
