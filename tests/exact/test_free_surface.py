@@ -183,6 +183,19 @@ def test_energy_is_booked_when_a_rope_is_drawn_out_of_the_water_and_a_mirrored_r
 
 
 @pytest.mark.long
+def test_a_rope_that_is_dipped_in_takes_the_momentum_of_its_water_and_half_of_the_work_is_lost():
+    """Both ends go down evenly, without drag: the water of the rope gets σρA U² of energy for σρA U of momentum."""
+    line = rope(2.0, compliance=1e-6, normal_drag_coefficient=0.0, tangential_drag_coefficient=0.0)
+    start = cable.hold(
+        [(5.001, 0.0, -0.04), (0.0, 0.0, -0.04)], 5.0, cable=line, segment_length=0.25, surface=0.0
+    )
+    down = lambda t: (0.0, 0.0, 1.0)  # noqa: E731
+    drum = cable.MovingDrum(velocity=down, drum=cable.Brake())
+    run = cable.pull_out(down, 0.1, drum=drum, start=start, scheme=cable.MovingEnd(time_step=0.001, rtol=0.0))
+    assert run.outcome.energy_residual < 0.02
+
+
+@pytest.mark.long
 def test_a_towed_floating_rope_trails_on_the_surface():
     run = cable.tow(lambda t: (1.0, 0.0, 0.0), 20.0, 20.0, cable=rope(0.5), surface=0.0)
     assert run.outcome.completed
