@@ -19,8 +19,9 @@ F_c            force on the vehicle                 N         (12), f_1 − ½Q_
 α, β           angles of the paper's local frame    rad       (3)-(4)                            feng_allen/equation7
 
 What a user calls stands here: `pull_out`, `tow` and `hold`, what they take (`properties`, `sections`, `sea_bed`,
-`drum`, `winch`, `current`, `schemes`) and give (`history`); and `tether.Tether`, which another simulator steps, in the
-default formulation. A call makes a `task` of it, which one of three formulations computes; they share nothing else:
+`clamps`, `drum`, `winch`, `current`, `waves`, `schemes`) and give (`history`); and `tether.Tether`, which another
+simulator steps, in the default formulation. A call makes a `task` of it, which one of three formulations computes; they
+share nothing else:
 
 * `moving_end`, the default: balances are vectors (their equivalence with the paper's six scalar equations, whose signs
   are derived again, is in `feng_allen.equation7` and tested), time is differenced backward, and a step is solved by
@@ -29,6 +30,7 @@ default formulation. A call makes a `task` of it, which one of three formulation
 * `feng_allen`: the paper's angles, in its own scheme (20)-(26) as printed, and in a box scheme of second order.
 """
 
+from cable.clamps import Clamps
 from cable.current import Current
 from cable.drum import DrumProperties
 from cable.history import Equilibrium, History, Outcome
@@ -42,6 +44,7 @@ from cable.sea_bed import SeaBed
 from cable.sections import Body, Section, SectionedCable, line_type, line_types
 from cable.task import MovingDrum
 from cable.tether import Tether, TetherError, TetherState
+from cable.waves import Motion, VesselResponse, Waves
 from cable.winch import Brake, ConstantTension, PayOutRate
 
 __all__ = [
@@ -49,6 +52,7 @@ __all__ = [
     "Body",
     "Brake",
     "CableProperties",
+    "Clamps",
     "ConstantTension",
     "Current",
     "Deck",
@@ -60,6 +64,7 @@ __all__ = [
     "HoldError",
     "Lumped",
     "Modes",
+    "Motion",
     "MovingDrum",
     "MovingEnd",
     "Outcome",
@@ -71,6 +76,8 @@ __all__ = [
     "Tether",
     "TetherError",
     "TetherState",
+    "VesselResponse",
+    "Waves",
     "hold",
     "line_type",
     "line_types",

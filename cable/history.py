@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cable.clamps import Clamps
 from cable.current import Current
 from cable.doubts import SLACK_SHARE, above_surface, doubts_of
 from cable.modes import Modes, find_modes
@@ -83,6 +84,7 @@ class History:
         tow_impulse: impulse of the cable on the vehicle just after each time, where the tow point changes its
             velocity at once (n, 3), zero elsewhere; the tow forces do not show it (`moving_end.jolt`). Empty for other
             schemes. [N s]
+        has_surface: whether the water had a free surface.
     """
 
     time: np.ndarray
@@ -96,6 +98,7 @@ class History:
     outcome: Outcome
     scheme: str
     tow_impulse: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    has_surface: bool = False
 
     def shape(self, t: float) -> np.ndarray:
         """Return the node positions (nodes, 3) relative to the drum at the recorded time nearest to t. [m].
@@ -123,8 +126,10 @@ class History:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Why the numbers of the run may be wrong, in sentences; none if nothing is known against them."""
-        how = self.outcome.energy_residual
-        return doubts_of(self.time, self.tow_force, self.length, self.shapes, self.tensions, how)
+        how, shapes = self.outcome.energy_residual, self.shapes
+        found = doubts_of(self.time, self.tow_force, self.length, shapes, self.tensions, how)
+        high = above_surface(shapes, [shape[:1] for shape in shapes]) if self.has_surface else ()
+        return tuple(words for words in found if words not in high)
 
     def diagnostics(self) -> Mapping[str, float]:
         """Return the numbers that show how far to trust the run, by name."""
@@ -241,6 +246,8 @@ class Equilibrium:
         steps: how many steps the search took; 2 or 3 where Newton's method came through at once.
         bed: the sea bed; None without.
         bed_friction: of the bed on the nodes, as a share of its pressure, north, east, down (nodes, 3); empty without.
+        clamps: directions in which it leaves its ends; None for hinges.
+        surface: depth of the free surface; None for water everywhere. [m]
     """
 
     cable: AnyCable
@@ -255,6 +262,8 @@ class Equilibrium:
     steps: int
     bed: SeaBed | None = None
     bed_friction: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    clamps: Clamps | None = None
+    surface: float | None = None
 
     @property
     def slack_length(self) -> float:
@@ -267,6 +276,7 @@ class Equilibrium:
     def warnings(self) -> tuple[str, ...]:
         """Why the numbers may be wrong, in sentences; none if nothing is known against them."""
         share, high = self.slack_length / self.length, above_surface([self.shape], [self.shape[[0, -1]]])
+        high = high if self.surface is None else ()
         if share <= SLACK_SHARE:
             return high
         return (f"{100.0 * share:.3g} % of the cable is slack: there its shape means nothing.", *high)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cable.clamps import Clamps
 from cable.current import Current, Water
 from cable.drum import DrumNumbers
 from cable.history import Equilibrium
@@ -35,17 +36,21 @@ SHARPEST = 0.7
 """Cosine of the largest angle between two segments of a stiff cable."""
 RESCALINGS = 3
 """How often the unit of force is corrected where the first guess of the tension was far off."""
+CLAMPING = (0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0)
+"""Shares of its stiffness with which a clamp takes hold, one after another. [-]"""
 WEIGHTLESS = 1e-9
 """A cable with less tension than this has no load at all. [N]"""
 ON_BED = 1e-4
 """An end that is nearer to the bed than this share of the length lies on it. [-]"""
 STIFFER = 4.0
-"""By so much the bed gets stiffer from search to search (`_sink_onto`). [-]"""
+"""By so much the bed gets stiffer, and the surface sharper, from search to search. [-]"""
+LIDS = 20
+"""In so many stages a surface comes down on a line that would rise above it."""
 ROUGHENINGS, SETTLED = 20, 1e-7
 """How often friction is taken again from the tension that it leaves, until it changes by less than this share."""
 FORCES = frozenset(
     {"mass", "added_mass", "weight", "retardation", "tangential_drag", "normal_drag", "bending_stiffness"}
-    | {"bed_stiffness", "bed_damping"}
+    | {"bed_stiffness", "bed_damping", "mass_along"}
 )
 """Numbers of a cable that forces are proportional to."""
 TAUT = 1.0 - 1e-9
@@ -66,6 +71,8 @@ def hold(
     segment_length: float | None = None,
     start: Place | None = None,
     bed: SeaBed | None = None,
+    clamps: Clamps | None = None,
+    surface: float | None = None,
 ) -> Equilibrium:
     """Return the equilibrium of a cable that is held at two ends.
 
@@ -91,6 +98,9 @@ def hold(
         segment_length: Δs; a hundredth of the length when not given. [m]
         start: node positions (any number, 3) to start the search from; a catenary under weight and drag when not given.
         bed: the sea bed, in the axes of `ends`; none when not given.
+        clamps: directions in which it leaves its ends, if it has a bending stiffness; hinges when not given.
+        surface: depth of a free surface, in the axes of `ends`: above it is air, and a light cable floats;
+            water everywhere when not given. [m]
 
     Raises:
         HoldError: ends, length or segments that make no sense; an unstretchable cable that is too short; no
@@ -105,10 +115,11 @@ def hold(
         bed.refuse_below(places, "hold")
     starts = [None] if start is None else [_checked_start(start, places), None]
     for nodes in starts:
-        steps, scale = _search(line, nodes, water.numbers(places[1]), cable, bed)
+        steps, scale = _search(line, nodes, water.numbers(places[1]), cable, bed, clamps, surface)
         if steps > 0:
             found = _found(line, places, length, cable, water, steps, scale)
             found = found if bed is None else replace(found, bed=bed, bed_friction=_friction(line))
+            found = replace(found, clamps=clamps, surface=surface)
             _check_bends(found)
             return found
     message = (
@@ -120,17 +131,70 @@ def hold(
 
 
 def _search(
-    line: Line, nodes: np.ndarray | None, water: Water, cable: AnyCable, bed: SeaBed | None
+    line: Line,
+    nodes: np.ndarray | None,
+    water: Water,
+    cable: AnyCable,
+    bed: SeaBed | None,
+    clamps: Clamps | None,
+    surface: float | None,
 ) -> tuple[int, float]:
     """Bring a line to rest from node positions, or from a catenary; return steps (−1: none) and the unit of force."""
-    c, work, brake = _at_rest_on(bed, cable), new_load(), Brake().numbers()
+    c, work, brake = _at_rest_on(bed, cable, clamps, surface), new_load(), Brake().numbers()
     brake.setpoint = line.ends.settled + line.ends.last_length[NOW]
+    if surface is not None:
+        c.surface_level = -1.0 / WEIGHTLESS  # hang it in water everywhere
     scale = hang(line, water, c, work)
     if nodes is not None:
         _lay_along(line, nodes)
     if bed is None:
-        return _come_to_rest(line, water, c, brake, work, scale)
-    return _sink_onto(bed, line, water, c, brake, work, scale)
+        # A clamp turns the cable in steps: its spring is proportional to the size of its tangent.
+        for share in CLAMPING if clamps is not None else (1.0,):
+            if clamps is not None:
+                c.clamp[:] = share * clamps.tangents
+                line.tension[:] *= scale if share > CLAMPING[0] else 1.0
+            steps, scale = _come_to_rest(line, water, c, brake, work, scale)
+            if steps < 0:
+                break
+    else:
+        steps, scale = _sink_onto(bed, line, water, c, brake, work, scale)
+    return _press_below(surface, line, water, c, brake, work, steps, scale)
+
+
+def _press_below(
+    surface: float | None,
+    line: Line,
+    water: Water,
+    c: Any,
+    brake: DrumNumbers,
+    work: Load,
+    steps: int,
+    scale: float,
+) -> tuple[int, float]:
+    """Bring a line at rest in water everywhere to rest below a surface, which comes down on it and gets sharper.
+
+    Each shape is near the next: the surface is as soft as the way that it comes down in a stage, and then ever less.
+    """
+    if surface is None or steps < 0:
+        return steps, scale
+    N, radius = (
+        int(line.ends.count),
+        0.5 * float(np.min(c.whole[-1] if c.whole[-1] > 0.0 else c.section[0, -1])),
+    )
+    above = surface - float(line.ends.origin[2] + line.position[NOW, : N + 1, 2].min())
+    stage = max(above / LIDS, radius)
+    levels = (
+        surface - stage * np.arange(np.ceil(above / stage) - 1.0, -1.0, -1.0) if above > 0.0 else [surface]
+    )
+    sharper = np.ceil(np.log(stage / radius) / np.log(STIFFER))
+    softer = [stage / radius] * len(levels) + [STIFFER**k for k in np.arange(sharper - 1.0, -1.0, -1.0)]
+    for k, c.softness in enumerate(softer):
+        c.surface_level = levels[min(k, len(levels) - 1)]
+        line.tension[:] *= scale
+        steps, scale = _come_to_rest(line, water, c, brake, work, scale)
+        if steps < 0:
+            break
+    return steps, scale
 
 
 def _sink_onto(
@@ -145,12 +209,12 @@ def _sink_onto(
     rough = bed.axial_friction if is_laid else 0.0
     deepest = float(bed.below(line.position[NOW, :nodes] + np.asarray(line.ends.origin)).max())
     soft = min(max(abs(c.weight), WEIGHTLESS) / max(deepest, c.bed_rounding), hard)
-    stiff = c.section[:, -2].copy() if "section" in c.names else 0.0
+    stiff = c.section[:, COLUMNS.index("bed_stiffness")].copy() if "section" in c.names else 0.0
     stages = int(np.ceil(np.log(hard / soft) / np.log(STIFFER)))
     for k, c.bed_stiffness in enumerate(hard * STIFFER ** -np.arange(stages, -1.0, -1.0)):
         line.tension[:] *= scale if k > 0 else 1.0
         if "section" in c.names:
-            c.section[:, -2] = stiff * c.bed_stiffness / hard
+            c.section[:, COLUMNS.index("bed_stiffness")] = stiff * c.bed_stiffness / hard
         steps, scale = _come_to_rest(line, water, c, brake, work, scale)
         if steps < 0:
             return steps, scale
@@ -183,9 +247,9 @@ def _come_to_rest(
     return steps, scale
 
 
-def _at_rest_on(bed: SeaBed | None, cable: AnyCable) -> Any:
+def _at_rest_on(bed: SeaBed | None, cable: AnyCable, clamps: Clamps | None, surface: float | None) -> Any:
     """Return the cable's numbers for a search for rest."""
-    c: Any = cable.numbers(bed)
+    c: Any = cable.numbers(bed, clamps, surface)
     if bed is not None:
         c.is_at_rest = True
     return c
@@ -203,11 +267,14 @@ def _in_units_of(scale: float, c: Any) -> Any:
     for name in c.names:
         if name in FORCES:
             c[name] = c[name] / scale
-        elif name in ("section", "body"):
+        elif name in ("section", "body", "whole"):
             c[name] /= scale
     c.compliance *= scale
     if "section" in c.names:
         c.section[:, COLUMNS.index("compliance")] *= scale * scale
+        c.section[:, COLUMNS.index("diameter")] *= scale
+    if "whole" in c.names:
+        c.whole[-1] *= scale  # a diameter
     return c
 
 

@@ -6,7 +6,7 @@ Small displacements u of the nodes and changes τ of the segments' tensions, in 
     M ü + K u + Bᵀ τ = 0,   B u = C τ,   (u, τ) ~ exp(iωt)
 
 M   momentum of the segments, each at the mean velocity of its nodes: ℓ (m I + C_aρA P), P = I − t tᵀ; and the bodies
-K   tension that turns, T P/r; bending, EI |P u′|² between neighbours; the bed, whose friction sticks
+K   tension that turns, T P/r; bending, EI |P u′|² between neighbours and at clamps; the bed, whose friction sticks
 B   stretch t·(u_j − u_{j−1});  C = eℓ, its share per newton: 0 for a cable that does not stretch
 
 With M = W Wᵀ, 1/ω² are the eigenvalues of Wᵀ G W, where G takes forces on the nodes to their displacements at rest, so
@@ -169,6 +169,11 @@ def find_modes(rest: Equilibrium, count: int, *, free_end: bool = False) -> Mode
             f"modes: {100.0 * share:.3g} % of the cable is slack, and has no shape to vibrate about. Give it less "
             "length, or weight."
         )
+    if rest.surface is not None and rest.shape[:, 2].min() < rest.surface + 0.5 * rest.cable.diameter:
+        raise UserError(
+            "modes: part of the cable is at the free surface, where its weight changes as it moves. Modes are of a "
+            "cable under water: hold it without a surface, or deeper."
+        )
     parts, moving = _small_motion(rest), slice(3, 3 * (N + 1 if free_end else N))
     displaced, pulled, squares = _lowest(parts, moving, count)
     u = np.zeros((3 * (N + 1), squares.size))
@@ -244,6 +249,9 @@ def _small_motion(rest: Equilibrium) -> _SmallMotion:
         hinge = np.repeat(2.0 * rest.cable.bending_stiffness / (lengths[1:] + lengths[:-1]), 3)
         bent = sparse.diags_array(np.sqrt(hinge)) @ (turned[3:] - turned[:-3])
         stiffness = stiffness + bent.T @ bent
+        for j in _clamped(rest):
+            held = np.sqrt(2.0 * rest.cable.bending_stiffness / lengths[j]) * turned[3 * j : 3 * j + 3]
+            stiffness = stiffness + held.T @ held
     along, across = np.sqrt(lengths * c["mass"]), np.sqrt(lengths * (c["mass"] + c["added_mass"]))
     wet = lengths * np.sqrt(1.0 + c["compliance"] * T)
     drag = _drag_slopes(0.5 * (flow[1:] + flow[:-1]), t, wet * c["tangential_drag"], wet * c["normal_drag"])
@@ -257,6 +265,12 @@ def _small_motion(rest: Equilibrium) -> _SmallMotion:
     )
     parts = _with_bodies(parts, rest, flow) if isinstance(rest.cable, SectionedCable) else parts
     return parts if rest.bed is None else _with_bed(parts, rest, rest.bed, c)
+
+
+def _clamped(rest: Equilibrium) -> list[int]:
+    """Return the segments at clamped ends."""
+    ways = (rest.clamps.first, rest.clamps.second) if rest.clamps else (None, None)
+    return [j for j, way in zip((0, rest.segment_lengths.size - 1), ways, strict=True) if way is not None]
 
 
 def _with_bodies(parts: _SmallMotion, rest: Equilibrium, flow: np.ndarray) -> _SmallMotion:
@@ -322,7 +336,7 @@ def _along(cable: Any, lengths: np.ndarray) -> dict[str, np.ndarray]:
         ends = np.cumsum([section.length for section in cable.sections])[:-1]
     which = np.searchsorted(ends, np.cumsum(lengths) - 0.5 * lengths)
     numbers: list[Any] = [each.numbers() for each in cables]
-    found = {name: np.array([c[name] for c in numbers])[which] for name in COLUMNS}
+    found = {name: np.array([c[name] for c in numbers])[which] for name in COLUMNS[:7]}
     return found | {"diameter": np.array([each.diameter for each in cables])[which]}
 
 

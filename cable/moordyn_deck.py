@@ -230,8 +230,6 @@ def _line_type(row: Row, water: float, left_out: list[str]) -> CableProperties:
     d, name = _number(row, "DIAM"), row.get("NAME")
     if _number(row, "EI", default=0.0) > 0.0:
         left_out.append(f"The bending stiffness EI of line type {name}.")
-    if _number(row, "CAAX", default=0.0) > 0.0:
-        left_out.append(f"The added mass along line type {name}, CaAx.")
     damping = _number(row, "BA", default=0.0)
     if damping < 0.0:
         left_out.append(f"The damping ratio −BA of line type {name}: give BA in N s, or none.")
@@ -243,6 +241,7 @@ def _line_type(row: Row, water: float, left_out: list[str]) -> CableProperties:
         normal_drag_coefficient=_number(row, "CD"),
         tangential_drag_coefficient=_number(row, "CDAX"),
         added_mass_coefficient=_number(row, "CA"),
+        tangential_added_mass_coefficient=_number(row, "CAAX", default=0.0),
         compliance=1.0 / _number(row, "EA"),
         internal_damping=max(damping, 0.0),
     )

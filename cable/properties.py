@@ -6,6 +6,7 @@ Symbols are those of Feng & Allen (2004), section 2.2; defaults are their Table 
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from functools import cache
 from math import isfinite, sqrt
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from subzero.errors import BadValueError, checked
 from subzero.jit import Record
 
 if TYPE_CHECKING:
+    from cable.clamps import Clamps
     from cable.sea_bed import SeaBed
 
 GRAVITY = 9.81
@@ -22,7 +24,10 @@ GRAVITY = 9.81
 
 
 class CableNumbers(Record):
-    """The cable as compiled code sees it: m, ρA, w_c, e, B e, the drag constants ½ρdπC_t and ½ρdC_n."""
+    """The cable as compiled code sees it: m, ρA C_a, w_c, e, B e, the drag constants ½ρdπC_t and ½ρdC_n.
+
+    With an added mass along the cable, `mass` is m + ρA C_at and `added_mass` ρA (C_a − C_at).
+    """
 
     mass: float
     added_mass: float
@@ -39,6 +44,18 @@ class StiffCableNumbers(CableNumbers):
     bending_stiffness: float
 
 
+class ClampedCableNumbers(StiffCableNumbers):
+    """The same with clamped ends: their tangents (2, 3), zeros at a hinge."""
+
+    clamp: np.ndarray
+
+
+class AlongCableNumbers(CableNumbers):
+    """The same of a cable with added mass along it, with ρA C_at [kg/m]."""
+
+    mass_along: float
+
+
 class LaidCableNumbers(CableNumbers):
     """The same of a cable above a sea bed: its plane, k, c, δ, μ and κ, see `cable.sea_bed`."""
 
@@ -53,15 +70,31 @@ class LaidCableNumbers(CableNumbers):
     is_at_rest: bool
 
 
-class SectionedCableNumbers(LaidCableNumbers):
+class FloatingCableNumbers(AlongCableNumbers):
+    """The same of a cable in water with a free surface, see `moving_end.surface`.
+
+    Attributes:
+        surface_level: depth of the surface. [m]
+        whole: m, ρA (C_a − C_at), ρA C_at, ½ρπdC_t, ½ρdC_n, ρAg and d of the segment that the record describes, if it
+            were all in water (7,).
+        softness: radii are so many times as large; 1 but in a search for rest.
+    """
+
+    surface_level: float
+    whole: np.ndarray
+    softness: float
+
+
+class SectionedCableNumbers(LaidCableNumbers, AlongCableNumbers):
     """The same of a line of sections and bodies: always of one section, and all of them, see `cable.sections`.
 
     Attributes:
-        section: numbers of each (sections, 9), `sections.COLUMNS`, then k and c of the bed.
+        section: numbers of each (sections, columns), `sections.COLUMNS`.
         section_end: where each ends, from the tow point; the last is endless (sections,). [m]
         section_now, section_segment, section_along: the section that the record describes, of which segment, and
             where that ends. [-], [-], [m]
-        body: m, ρC_aV, weight in water, ½ρC_dA, ½ρC_LA of each body (bodies, 5).
+        body: m, ρC_aV, weight in water, ½ρC_dA, ½ρC_LA, ρVg of each body (bodies, 6).
+        body_radius: of a sphere of its volume (bodies,). [m]
         body_place: distance from the tow point (bodies,). [m]
         body_count: how many there are.
     """
@@ -72,14 +105,17 @@ class SectionedCableNumbers(LaidCableNumbers):
     section_segment: int
     section_along: float
     body: np.ndarray
+    body_radius: np.ndarray
     body_place: np.ndarray
     body_count: int
 
 
-class StiffLaidCableNumbers(LaidCableNumbers):
-    """The same of a cable that resists bending, with EI [N m²]."""
-
-    bending_stiffness: float
+@cache
+def numbers_of(kinds: tuple[type[CableNumbers], ...]) -> type[CableNumbers]:
+    """Return the class of the numbers of a cable that is of several kinds at once."""
+    if len(kinds) < 2:
+        return kinds[0] if kinds else CableNumbers
+    return type("".join(kind.__name__.removesuffix("CableNumbers") for kind in kinds), kinds, {})
 
 
 ABOVE_ZERO = ("water_density", "mass_per_length", "cross_section_area", "diameter")
@@ -98,6 +134,7 @@ class CableProperties:
         tangential_drag_coefficient: C_t, on the wetted surface π d. [-]
         normal_drag_coefficient: C_n, on the projected area d. [-]
         added_mass_coefficient: C_a, added mass across the cable as a share of ρA; 1 for a round cylinder. [-]
+        tangential_added_mass_coefficient: C_at, the same along it; 0 for a smooth cable, some 0.5 for chain. [-]
         compliance: e = 1/(E A); 0 is an inextensible cable. [1/N]
         internal_damping: B, of stretch, T = E A ε + B dε/dt; see `moving_end.slack_law`. [N s]
         bending_stiffness: E I; see `moving_end.bending`. [N m²]
@@ -115,6 +152,7 @@ class CableProperties:
     tangential_drag_coefficient: float = 0.01
     normal_drag_coefficient: float = 1.0
     added_mass_coefficient: float = 1.0
+    tangential_added_mass_coefficient: float = 0.0
     compliance: float = 0.0
     internal_damping: float = 0.0
     bending_stiffness: float = 0.0
@@ -147,6 +185,11 @@ class CableProperties:
         return (self.mass_per_length - self.water_density * self.cross_section_area) * GRAVITY
 
     @property
+    def buoyancy(self) -> float:
+        """ρAg. [N/m]."""
+        return self.water_density * self.cross_section_area * GRAVITY
+
+    @property
     def tangential_drag(self) -> float:
         """½ρπdC_t, the drag per metre at 1 m/s along the cable: 0.03927 for Table 1. [N s²/m³]."""
         pi = 3.141592653589793
@@ -164,11 +207,14 @@ class CableProperties:
         ratio = abs(self.weight_in_water) / (2.0 * self.normal_drag * speed * speed)
         return acos(sqrt(1.0 + ratio * ratio) - ratio)
 
-    def numbers(self, bed: SeaBed | None = None) -> CableNumbers:
-        """Return the plain numbers that compiled code takes, of a cable that may bend, above a bed if there is one."""
+    def numbers(
+        self, bed: SeaBed | None = None, clamps: Clamps | None = None, surface: float | None = None
+    ) -> CableNumbers:
+        """Return the plain numbers that compiled code takes: clamped, above a bed, below a surface."""
+        along = self.tangential_added_mass_coefficient * self.water_density * self.cross_section_area
         values: dict[str, Any] = {
-            "mass": self.mass_per_length,
-            "added_mass": self.added_mass_coefficient * self.water_density * self.cross_section_area,
+            "mass": self.mass_per_length + along,
+            "added_mass": self.added_mass_coefficient * self.water_density * self.cross_section_area - along,
             "weight": self.weight_in_water,
             "compliance": self.compliance,
             "retardation": self.internal_damping * self.compliance,
@@ -179,16 +225,27 @@ class CableProperties:
             raise BadValueError(
                 "CableProperties: its numbers are so large that masses, weights or drags are not finite."
             )
-        if self.bending_stiffness > 0.0:
-            values["bending_stiffness"] = self.bending_stiffness
-        kind = KINDS[self.bending_stiffness > 0.0, bed is not None]
-        return kind(**values | (bed.numbers(self) if bed is not None else {}))
-
-
-KINDS: dict[tuple[bool, bool], type[CableNumbers]] = {
-    (False, False): CableNumbers,
-    (True, False): StiffCableNumbers,
-    (False, True): LaidCableNumbers,
-    (True, True): StiffLaidCableNumbers,
-}
-"""Whether a cable resists bending, and whether there is a bed → its numbers."""
+        special: dict[type[CableNumbers], dict[str, Any]] = {}
+        if clamps is not None:
+            special[ClampedCableNumbers] = clamps.numbers(self)
+        elif self.bending_stiffness > 0.0:
+            special[StiffCableNumbers] = {"bending_stiffness": self.bending_stiffness}
+        if surface is not None:
+            parts = (
+                self.mass_per_length,
+                values["added_mass"],
+                along,
+                self.tangential_drag,
+                self.normal_drag,
+            )
+            whole = np.array([*parts, self.buoyancy, self.diameter])
+            level = checked("", "surface", surface, unit="m, its depth")
+            floating = {"surface_level": level, "whole": whole, "softness": 1.0, "mass_along": along}
+            special[FloatingCableNumbers] = floating
+        elif along > 0.0:
+            special[AlongCableNumbers] = {"mass_along": along}
+        if bed is not None:
+            special[LaidCableNumbers] = bed.numbers(self)
+        for more in special.values():
+            values |= more
+        return numbers_of(tuple(special))(**values)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from cable.clamps import Clamps
 from cable.current import Current
 from cable.history import Equilibrium, History
 from cable.moving_end import time_loop
@@ -19,11 +20,14 @@ from cable.schemes import Equation7, Lumped, MovingEnd, Options, Paper
 from cable.sea_bed import SeaBed
 from cable.sections import AnyCable
 from cable.task import (
+    CLAMPS,
     EQUILIBRIUM,
     EVERYTHING,
     INTERNAL_DAMPING,
+    MASS_ALONG,
     SEA_BED,
     SECTIONS,
+    SURFACE,
     Drum,
     MovingDrum,
     PullOut,
@@ -80,7 +84,7 @@ SCHEMES: Mapping[str, Scheme] = {
         Lumped(),
         _lumped_pull_out,
         _lumped_tow,
-        EVERYTHING - {EQUILIBRIUM, INTERNAL_DAMPING, SEA_BED, SECTIONS},
+        EVERYTHING - {EQUILIBRIUM, INTERNAL_DAMPING, SEA_BED, SECTIONS, MASS_ALONG, CLAMPS, SURFACE},
     ),
 }
 """Name → the scheme; the first is the default, and "paper" the usable reading of the paper's."""
@@ -96,6 +100,8 @@ def pull_out(
     current: Sequence[float] | np.ndarray | Current | None = None,
     start: float | Equilibrium = 0.0,
     bed: SeaBed | None = None,
+    clamps: Clamps | None = None,
+    surface: float | None = None,
     scheme: str | Options = "moving_end",
 ) -> History:
     """Pull a cable off a drum, starting with the tow point at the drum unless `start` says otherwise.
@@ -119,6 +125,9 @@ def pull_out(
             or streams between vehicle and drum, from `cable.hold`: the run begins with it, its cable and its current
             (unless others are given), its length, its segments and its bed.
         bed: the sea bed, in the axes of the current; none when not given.
+        clamps: directions in which a cable with bending stiffness leaves its ends; hinges when not given. The second
+            end may be clamped only where a `cable.Brake` holds it.
+        surface: depth of a free surface, in the axes of the current; water everywhere when not given. [m]
         scheme: how it is computed: `cable.MovingEnd` (the default), `cable.Lumped`, `cable.Equation7` or `cable.Paper`,
             each with its options, or a name of `cable.SCHEMES` for one as it is by default.
 
@@ -131,13 +140,10 @@ def pull_out(
             (Bad values are a ValueError, too.)
     """
     row, options = _chosen(scheme)
-    task = PullOut.of(tow_velocity, duration, cable=cable, drum=drum, current=current, start=start, bed=bed)
-    missing = [what for what in task.asks_for() if what not in row.knows]
-    if missing:
-        able = [repr(name) for name, other in SCHEMES.items() if set(task.asks_for()) <= other.knows]
-        raise BadValueError(
-            f"scheme '{options.name}' does not know {' and '.join(missing)}; use {' or '.join(able)}."
-        )
+    task = PullOut.of(
+        tow_velocity, duration, cable=cable, drum=drum, current=current, start=start, bed=bed, clamps=clamps
+    )
+    _refuse_unknown(task, row, options)
     return row.pull_out(task, options)
 
 
@@ -151,6 +157,8 @@ def tow(
     current: Sequence[float] | np.ndarray | Current | None = None,
     drogue_drag_area: float = 0.0,
     bed: SeaBed | None = None,
+    clamps: Clamps | None = None,
+    surface: float | None = None,
     scheme: str | Options = "moving_end",
 ) -> History:
     """Tow a cable of fixed length, starting from the exact steady straight tow.
@@ -168,6 +176,10 @@ def tow(
         drogue_drag_area: C_d A of a drogue at the free end; 0 is a free tail. [m²]
         bed: the sea bed, at places relative to the tow point at the start; none when not given. What would begin
             below it trails on it.
+        clamps: direction in which a cable with bending stiffness leaves the tow point; a hinge when not given. It
+            begins in the steady tow without.
+        surface: depth of a free surface, relative to the tow point at the start; water everywhere when not given. What
+            would begin above it trails on it. [m]
         scheme: as in `cable.pull_out`; the paper's cannot tow a free end.
 
     Returns:
@@ -190,10 +202,21 @@ def tow(
         current=current,
         drogue_drag_area=drogue_drag_area,
         bed=bed,
+        clamps=clamps,
+        surface=surface,
     )
-    if bed is not None and SEA_BED not in row.knows:
-        raise BadValueError(f"scheme '{options.name}' does not know {SEA_BED}; use 'moving_end'.")
+    _refuse_unknown(task, row, options)
     return row.tow(task, options)
+
+
+def _refuse_unknown(task: PullOut | Tow, row: Scheme, options: Options) -> None:
+    """Raise an error for features that a scheme does not know."""
+    missing = [what for what in task.asks_for() if what not in row.knows]
+    if missing:
+        able = [repr(name) for name, other in SCHEMES.items() if set(task.asks_for()) <= other.knows]
+        raise BadValueError(
+            f"scheme '{options.name}' does not know {' and '.join(missing)}; use {' or '.join(able)}."
+        )
 
 
 def _chosen(scheme: object) -> tuple[Scheme, Options]:

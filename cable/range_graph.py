@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from cable.clamps import Clamps
     from cable.history import Equilibrium
 
 LABELS = {
@@ -22,7 +23,7 @@ LABELS = {
     "position": ("m", "place of the nodes"),
     "tension": ("N", "tension at the nodes"),
     "declination": ("rad", "angle of the cable to the horizontal, positive where it leads down"),
-    "curvature": ("1/m", "curvature at the nodes; 0 at the ends, which are hinges"),
+    "curvature": ("1/m", "curvature at the nodes; 0 at ends that are hinges"),
     "bend_radius": ("m", "radius of the bend at the nodes; infinite where the cable is straight"),
 }
 """Name in the dataset → unit and words."""
@@ -37,21 +38,27 @@ def declinations(shape: np.ndarray) -> np.ndarray:
     return means
 
 
-def curvatures(shape: np.ndarray) -> np.ndarray:
+def curvatures(shape: np.ndarray, clamps: Clamps | None = None) -> np.ndarray:
     """Return the curvature at the nodes (nodes,) of a shape (nodes, 3). [1/m]"""
     chords = np.diff(shape, axis=0)
     lengths = np.maximum(np.linalg.norm(chords, axis=1), SHORTEST)
     t = chords / lengths[:, None]
+    if (
+        clamps is not None
+    ):  # a segment of no length beyond each end: along the clamp, or straight on from a hinge
+        first, second = (way if way.any() else t[-k] for k, way in enumerate(clamps.tangents))
+        t, lengths = np.vstack([first, t, second]), np.concatenate([[0.0], lengths, [0.0]])
     turned, along = np.linalg.norm(t[1:] - t[:-1], axis=1), np.linalg.norm(t[1:] + t[:-1], axis=1)
     bent = 2.0 * turned / np.maximum(along, SHORTEST) / (0.5 * (lengths[1:] + lengths[:-1]))
-    return np.concatenate([[0.0], bent, [0.0]])
+    ends = np.zeros(0 if clamps is not None else 1)
+    return np.concatenate([ends, bent, ends])
 
 
 def dataset_of(rest: Equilibrium) -> xr.Dataset:
     """Return a cable at rest as an xarray dataset over its nodes."""
     import xarray as xr  # heavy, and nothing else of a cable at rest needs it
 
-    curvature = curvatures(rest.shape)
+    curvature = curvatures(rest.shape, rest.clamps)
     values = {
         "tension": rest.tensions,
         "declination": declinations(rest.shape),

@@ -27,14 +27,25 @@ from typing import Any
 
 import numpy as np
 
-from cable.properties import GRAVITY, CableNumbers, CableProperties, SectionedCableNumbers
+from cable.clamps import Clamps
+from cable.properties import (
+    GRAVITY,
+    CableNumbers,
+    CableProperties,
+    FloatingCableNumbers,
+    SectionedCableNumbers,
+    numbers_of,
+)
 from cable.sea_bed import SeaBed
 from subzero.errors import BadValueError, checked, short, suggestion
 
 MOST = 16
 """So many sections, and so many bodies, a line can have: compiled code keeps space for them."""
-COLUMNS = ("mass", "added_mass", "weight", "compliance", "retardation", "tangential_drag", "normal_drag")
-"""Columns of `SectionedCableNumbers.section`; on a bed, k and c follow."""
+COLUMNS = (
+    *("mass", "added_mass", "weight", "compliance", "retardation", "tangential_drag", "normal_drag"),
+    *("bed_stiffness", "bed_damping", "mass_along", "buoyancy", "diameter"),
+)
+"""Columns of `SectionedCableNumbers.section`."""
 NO_BED = SeaBed(depth=1e9)
 
 
@@ -224,39 +235,53 @@ class SectionedCable:
         counts = np.maximum(np.ceil(np.diff(cuts) / each - 1e-9), 1.0).astype(int)
         return np.repeat(np.diff(cuts) / counts, counts)
 
-    def numbers(self, bed: SeaBed | None = None) -> CableNumbers:
+    def numbers(
+        self, bed: SeaBed | None = None, clamps: Clamps | None = None, surface: float | None = None
+    ) -> CableNumbers:
         """Return the plain numbers that compiled code takes; those of the first section are selected."""
-        rows, ends, points, places = (
-            np.zeros((MOST, 9)),
+        if clamps is not None:
+            clamps.numbers(self)  # refuses
+        rows, ends, points, places, radii = (
+            np.zeros((MOST, len(COLUMNS))),
             np.full(MOST, np.inf),
-            np.zeros((MOST, 5)),
+            np.zeros((MOST, 6)),
+            np.zeros(MOST),
             np.zeros(MOST),
         )
         ground = NO_BED if bed is None else bed
         for k, section in enumerate(self.sections):
             c: Any = section.cable.numbers(ground)
-            rows[k] = [*(c[name] for name in COLUMNS), c.bed_stiffness, c.bed_damping]
+            more = {"mass_along": 0.0, "buoyancy": section.cable.buoyancy, "diameter": section.cable.diameter}
+            rows[k] = [c[name] if name in c.names else more[name] for name in COLUMNS]
         ends[: len(self.sections) - 1] = np.cumsum([section.length for section in self.sections])[:-1]
         half = 0.5 * self.water_density
         for k, body in enumerate(self.bodies):
             added = self.water_density * body.added_mass_coefficient * body.volume
             weight = (body.mass - self.water_density * body.volume) * GRAVITY
-            points[k] = body.mass, added, weight, half * body.drag_area, half * body.lift_area
+            lifted = self.water_density * body.volume * GRAVITY
+            points[k] = body.mass, added, weight, half * body.drag_area, half * body.lift_area, lifted
+            radii[k] = np.cbrt(0.75 * body.volume / np.pi)
             places[k] = body.place
         first = replace(self.sections[0].cable, diameter=self.diameter)
-        values: dict[str, Any] = {name: rows[0, k] for k, name in enumerate(COLUMNS)}
-        return SectionedCableNumbers(
-            **values,
-            **ground.numbers(first) | {"bed_stiffness": rows[0, 7], "bed_damping": rows[0, 8]},
+        values: dict[str, Any] = {name: rows[0, k] for k, name in enumerate(COLUMNS[:10])}
+        kind: Any = SectionedCableNumbers
+        if surface is not None:
+            kind = numbers_of((FloatingCableNumbers, SectionedCableNumbers))
+            level = checked("", "surface", surface, unit="m, its depth")
+            values |= {"surface_level": level, "whole": np.zeros(7), "softness": 1.0}
+        made: CableNumbers = kind(
+            **ground.numbers(first) | values,
             section=rows,
             section_end=ends,
             section_now=0,
             section_segment=0,
             section_along=0.0,
             body=points,
+            body_radius=radii,
             body_place=places,
             body_count=len(self.bodies),
         )
+        return made
 
 
 def check_length(cable: SectionedCable, length: float) -> None:

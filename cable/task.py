@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from cable.clamps import Clamps
 from cable.current import Current
 from cable.drum import DrumProperties
 from cable.history import Equilibrium
@@ -32,8 +33,12 @@ WET_LENGTH, EQUILIBRIUM = "cable in the water at the start", "a start from cable
 INTERNAL_DAMPING = "internal damping of the cable"
 SEA_BED = "a sea bed"
 SECTIONS = "a cable of several sections"
+CLAMPS = "clamped ends"
+SURFACE = "a free surface"
+MASS_ALONG = "added mass along the cable"
 EVERYTHING = frozenset(
     {WINCH, MOVING_DRUM, UNEVEN_CURRENT, WET_LENGTH, EQUILIBRIUM, INTERNAL_DAMPING, SEA_BED, SECTIONS}
+    | {MASS_ALONG, CLAMPS, SURFACE}
 )
 """Features that a task may ask for beyond a free drum on the shore, uniform water and no cable at the start."""
 
@@ -66,6 +71,8 @@ class PullOut:
         start: length of cable in the water at the start, laid straight behind the tow point [m]; or how it hangs.
         origin: place of the drum at the start, in the axes of the current (3,). [m]
         bed: the sea bed, in the axes of the current; None without.
+        clamps: directions in which it leaves its ends; None for hinges.
+        surface: depth of the free surface, in the axes of the current; None for water everywhere. [m]
     """
 
     tow_velocity: Velocity
@@ -77,6 +84,8 @@ class PullOut:
     start: float | Equilibrium
     origin: np.ndarray
     bed: SeaBed | None
+    clamps: Clamps | None
+    surface: float | None
 
     @classmethod
     def of(
@@ -89,6 +98,8 @@ class PullOut:
         current: Sequence[float] | np.ndarray | Current | None = None,
         start: float | Equilibrium = 0.0,
         bed: SeaBed | None = None,
+        clamps: Clamps | None = None,
+        surface: float | None = None,
     ) -> PullOut:
         """Return the task of `cable.pull_out`, with defaults filled in.
 
@@ -100,6 +111,8 @@ class PullOut:
             cable = start.cable if cable is None else cable
             origin, current = (start.shape[-1], start.current) if current is None else (origin, current)
             bed = start.bed if bed is None else bed
+            clamps = start.clamps if clamps is None else clamps
+            surface = start.surface if surface is None else surface
         else:
             start = checked("", "start", start, least=0.0, unit="m, or what cable.hold gives")
         cable, drum = _cable_of(cable), DrumProperties() if drum is None else drum
@@ -113,6 +126,8 @@ class PullOut:
             start=start,
             origin=origin,
             bed=bed,
+            clamps=clamps,
+            surface=surface,
         )
 
     @property
@@ -129,10 +144,8 @@ class PullOut:
             WET_LENGTH: not isinstance(self.start, Equilibrium) and self.start > 0.0,
             EQUILIBRIUM: isinstance(self.start, Equilibrium),
             INTERNAL_DAMPING: self.cable.internal_damping > 0.0,
-            SEA_BED: self.bed is not None,
-            SECTIONS: isinstance(self.cable, SectionedCable),
         }
-        return [what for what, is_asked in asked.items() if is_asked]
+        return [what for what, is_asked in asked.items() if is_asked] + _asked_of(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,6 +160,8 @@ class Tow:
         current: how the water moves, at places relative to the tow point at the start.
         drogue_drag_area: C_d A of a drogue at the free end; 0 is a free tail. [m²]
         bed: the sea bed, at places relative to the tow point at the start; None without.
+        clamps: direction in which it leaves the tow point; None for a hinge.
+        surface: depth of the free surface, relative to the tow point at the start; None for water everywhere. [m]
     """
 
     tow_velocity: Velocity
@@ -156,6 +171,8 @@ class Tow:
     current: Current
     drogue_drag_area: float
     bed: SeaBed | None
+    clamps: Clamps | None
+    surface: float | None
 
     @classmethod
     def of(
@@ -168,6 +185,8 @@ class Tow:
         current: Sequence[float] | np.ndarray | Current | None = None,
         drogue_drag_area: float = 0.0,
         bed: SeaBed | None = None,
+        clamps: Clamps | None = None,
+        surface: float | None = None,
     ) -> Tow:
         """Return the task of `cable.tow`, with defaults filled in.
 
@@ -182,12 +201,30 @@ class Tow:
             current=current_of(current),
             drogue_drag_area=checked("", "drogue_drag_area", drogue_drag_area, least=0.0),
             bed=bed,
+            clamps=clamps,
+            surface=surface,
         )
+
+    def asks_for(self) -> list[str]:
+        """Return the features of `EVERYTHING` that it asks for."""
+        return _asked_of(self)
 
     @property
     def tail_drag(self) -> float:
         """½ρC_dA of the drogue. [kg/m]."""
         return 0.5 * self.cable.water_density * self.drogue_drag_area
+
+
+def _asked_of(task: PullOut | Tow) -> list[str]:
+    """Return the features that both kinds of tasks can ask for."""
+    asked = {
+        SEA_BED: task.bed is not None,
+        CLAMPS: task.clamps is not None,
+        SURFACE: task.surface is not None,
+        SECTIONS: isinstance(task.cable, SectionedCable),
+        MASS_ALONG: getattr(task.cable, "tangential_added_mass_coefficient", 0.0) > 0.0,
+    }
+    return [what for what, is_asked in asked.items() if is_asked]
 
 
 def checked_duration(value: float) -> float:

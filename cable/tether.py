@@ -27,6 +27,7 @@ from uuid import uuid4
 
 import numpy as np
 
+from cable.clamps import Clamps
 from cable.current import Current
 from cable.drum import LENGTH, DrumNumbers, DrumProperties
 from cable.drum_motion import PLACE, SETPOINT, VELOCITY
@@ -51,7 +52,13 @@ from cable.moving_end.host_step import (
     laid,
     make_real,
 )
-from cable.moving_end.initial_shape import lay_held, straight_between, towed_from, trail_on_bed
+from cable.moving_end.initial_shape import (
+    lay_held,
+    straight_between,
+    towed_from,
+    trail_on_bed,
+    trail_on_surface,
+)
 from cable.moving_end.state import NOW, Line, enlarged, new_line
 from cable.moving_end.stops import Names, describe_bad_number, describe_jump, describe_reach, describe_stop
 from cable.properties import CableProperties
@@ -128,6 +135,8 @@ class Tether:
         segment_length: float | None = None,
         drogue_drag_area: float = 0.0,
         bed: SeaBed | None = None,
+        clamps: Clamps | None = None,
+        surface: float | None = None,
         rtol: float = RTOL,
         atol: float = ATOL,
         tolerance: float = TOLERANCE,
@@ -148,6 +157,9 @@ class Tether:
             segment_length: how long they are, also those of cable that is paid out later. [m]
             drogue_drag_area: C_d A of a drogue at the free tail. [m²]
             bed: the sea bed, in the axes of the ends; none when not given.
+            clamps: directions in which a cable with bending stiffness leaves its ends; hinges when not given. The
+                second end may be clamped only where a brake holds it.
+            surface: depth of a free surface, in the axes of the ends; water everywhere when not given. [m]
             rtol: error of the force that an inner step may make, as a share of the largest force so far; 0 takes the
                 steps of the host as they are.
             atol: an error that it may make in any case. [N]
@@ -159,6 +171,7 @@ class Tether:
         self._tried: tuple[float, np.ndarray, Drum, np.ndarray] | None = None
         self.cable = CableProperties() if cable is None else cable
         self.current, self._bed, self._owner = current_of(current), bed, uuid4().hex
+        self._clamps, self._surface = clamps, surface
         states = _checked_ends("Tether", ends, None)
         self._ends, two = len(states), len(states) == 2
         self._winch: Drum = DrumProperties() if not two else Brake() if winch is None else winch
@@ -174,7 +187,11 @@ class Tether:
             inf if longest is None else checked("Tether", "longest", longest, least=start, unit="m")
         )
         each = _segment_length(start, segments, segment_length)
-        drum, c = self._winch.numbers(), self.cable.numbers(bed)
+        drum, c = self._winch.numbers(), self.cable.numbers(bed, clamps, surface)
+        if clamps is not None and clamps.second is not None and not (two and isinstance(self._winch, Brake)):
+            raise BadValueError(
+                "Tether: the second end is clamped; only what a cable.Brake holds can be. Leave Clamps.second out."
+            )
         if bed is not None:
             bed.refuse_below(states[:, 0], "Tether")
         if not two:
@@ -185,12 +202,22 @@ class Tether:
             line, origin = towed_from(self.cable, states[0], start, each, J, tail_drag)
             line.ends.origin[:] = origin
             trail_on_bed(line, bed)
+            trail_on_surface(line, surface)
         elif abs(start - way) <= STRAIGHT * start or way <= START_LENGTH >= start:
             line, origin = straight_between(states, start, each, drum, c), states[1, 0]
         else:
             rate = _rate_at_start(self._winch)
             passing = _passing(self.current, states, rate)
-            rest = hold(states[:, 0], start, passing, cable=self.cable, segment_length=each, bed=bed)
+            rest = hold(
+                states[:, 0],
+                start,
+                passing,
+                cable=self.cable,
+                segment_length=each,
+                bed=bed,
+                clamps=clamps,
+                surface=surface,
+            )
             line, origin = _from_rest(rest, states, drum, rate), states[1, 0]
         line.ends.origin[:] = origin
         line.ends.solver.tolerance = checked("Tether", "tolerance", tolerance, least=FINEST, most=COARSEST)
@@ -390,6 +417,8 @@ class Tether:
             segment_tensions=line.tension[NOW, 1 : N + 1].copy(),
             steps=0,
             bed=self._bed,
+            clamps=self._clamps,
+            surface=self._surface,
         )
         return find_modes(here, count, free_end=self._ends == 1)
 

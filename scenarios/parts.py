@@ -41,6 +41,8 @@ FEW = 5
 """So many missing numbers are named one by one; more are one problem, of a file that is not a whole one yet."""
 
 OPTIONAL = {
+    "cable.added_mass_coefficient": 1.0,
+    "cable.tangential_added_mass_coefficient": 0.0,
     "cable.internal_damping": 0.0,
     "cable.bending_stiffness": 0.0,
     "cable.strength": 0.0,

@@ -27,6 +27,7 @@ from scenarios.trial import (
     FOUND_BY_TRIM,
     FOUND_WHY,
     ONLY_DEFAULT,
+    ONLY_DEFAULT_CABLE,
     TRIM_NEEDS_SPEED,
     Profile,
     Start,
@@ -387,6 +388,5 @@ def check_scheme(source: Source, run: Mapping[str, Any], cable: Mapping[str, flo
         asked.append("a profile in [water]")
     if run.get("grading", 0.0) > 0.0:
         asked.append("grading")
-    features = ("internal_damping", "bending_stiffness")
-    asked += [f"the cable's {name}" for name in features if cable.get(name, 0.0) > 0.0]
+    asked += [f"the cable's {name}" for name in ONLY_DEFAULT_CABLE if cable.get(name, 0.0) > 0.0]
     return [source.problem("run.scheme", ONLY_DEFAULT, only_default(asked), found=scheme)] if asked else []

@@ -41,6 +41,8 @@ from subzero.files.text_repr import Overview
 SETPOINT = dict(zip(CONTROLS, (*WINCH[1:], None), strict=True))
 """Control of a winch → the quantity that it follows."""
 
+ONLY_DEFAULT_CABLE = ("tangential_added_mass_coefficient", "internal_damping", "bending_stiffness")
+"""Numbers of a cable that only the default scheme knows."""
 ONLY_DEFAULT = "the paper's scheme knows a limp cable on a free drum on the shore, and a uniform current"
 
 
@@ -367,9 +369,7 @@ class Trial:
         for name, found, why, remedy in misfits({n: getattr(self, n) for n in RUN_FIELDS} | vars(self.start)):
             check.say(name, why, remedy, found)
         asked = [name for name in ("profile", "winch", "vessel", "grading") if getattr(self, name)]
-        asked += [
-            name for name in ("internal_damping", "bending_stiffness") if self.cable.get(name, 0.0) > 0.0
-        ]
+        asked += [name for name in ONLY_DEFAULT_CABLE if self.cable.get(name, 0.0) > 0.0]
         if self.scheme != SCHEMES[0] and asked:
             check.say("scheme", ONLY_DEFAULT, only_default(asked), self.scheme)
         check.refuse()

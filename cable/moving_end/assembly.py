@@ -37,7 +37,7 @@ import numpy as np
 
 from cable.drum import FREE, STANDING, DrumNumbers
 from cable.moving_end.bdf2 import Weights
-from cable.moving_end.bending import add_bending
+from cable.moving_end.bending import add_bending, add_clamps
 from cable.moving_end.composition import add_bodies
 from cable.moving_end.contact import add_contact
 from cable.moving_end.drum_end import drum_row
@@ -45,6 +45,7 @@ from cable.moving_end.segment_load import (
     Load,
     differentiate_load,
     evaluate_load,
+    mass_along,
     measured_chord,
     take_segment,
 )
@@ -60,7 +61,9 @@ from cable.moving_end.state import (
     Line,
     held_node,
     select_section,
+    wet_at_new,
 )
+from cable.moving_end.surface import add_surface
 from cable.properties import CableNumbers
 from subzero.jit import compiled, inlined, inner
 
@@ -110,6 +113,7 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
     for j in range(1, N + 1):
         length, T = _length(line, j), line.tension[NEW, j]
         select_section(line, c, j)
+        wet_at_new(line, c, j)
         work.square, work.chord_length, work.shorter = ahead
         by_strain = _length_equation(line, j, T, w, c, work.square, slopes)
         take_segment(line.position[NEW], line.velocity[NEW], line.water[NEW], j, work)
@@ -136,7 +140,6 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
                 _scatter_influx(line, T, length, work)
             _scatter_length(line, j, length, by_strain, work)
     _keep_tow_force(line, slopes)
-    add_bending(line, c)
     add_contact(line, c, w, slopes)
     add_bodies(line, c, w, slopes)
     if N > 1:
@@ -145,6 +148,9 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
         add_drogue(line, w, slopes)
     else:
         drum_row(line, w, drum, work, slopes)
+    add_bending(line, c)
+    add_clamps(line, c)
+    add_surface(line, c, w, slopes)
     if N == 1 and drum.control == FREE and not line.ends.layout.free_end:
         write_single_segment(line, work.chord)
 
@@ -359,6 +365,7 @@ def add_influx(line: Line, c: CableNumbers, work: Load) -> None:
     # along t: of the added mass only the water that passes the drum is left.
     for i in range(3):
         entering = c.mass * line.velocity[NEW, N, i] - c.added_mass * (J[i] - Jt * t[i])
+        entering -= mass_along(line, c) * line.water[NEW, N, i]
         line.load[N, i] -= U * entering
 
 
@@ -375,6 +382,7 @@ def differentiate_influx(
     stretch = 0.5 * c.compliance / (1.0 + c.compliance * T)
     for i in range(3):
         entering = c.mass * line.velocity[NEW, N, i] - c.added_mass * (J[i] - Jt * t[i])
+        entering -= mass_along(line, c) * line.water[NEW, N, i]
         by_far[i, 0] = length * stretch * work.drag[i]
         by_far[i, 1] = work.q[i] - dU * entering - U * c.mass * (U / length - dU) * d[i] / length
         by_far[i, 1] -= fading * (length * work.q_tt[i] - 2.0 * U * c.added_mass * Jt * t[i])

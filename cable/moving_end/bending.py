@@ -4,8 +4,8 @@ The bending energy of a chain of straight segments with tangents t_j, and the sh
 
     E_B = Σ ½ EI |t_{j+1} − t_j|²/ℓ̄_j,   M_j = EI (t_{j+1} − t_j)/ℓ̄_j,   q_j = P_j (M_j − M_{j−1})/|d_j|
 
-with ℓ̄_j = ½(ℓ_j + ℓ_{j+1}) and no moment at the two ends (hinges at the vehicle and at the drum; a layer of thickness
-√(EI/T) at a clamped end is not modelled). f_j of `assembly` becomes T_j t_j − q_j; for a gently bent cable q is
+with ℓ̄_j = ½(ℓ_j + ℓ_{j+1}), and no moment at the two ends unless they are clamped (`cable.clamps`): then
+q = k P t_c/|d| more in the first or last segment. f_j of `assembly` becomes T_j t_j − q_j; for a gently bent cable q is
 EI ∂³x/∂s³. It depends on four nodes, so a balance depends on five: the matrix gets two blocks more than its three
 diagonals. ℓ̄ of the growing segment is taken from the step before. A cable without EI compiles nothing of this.
 
@@ -22,7 +22,7 @@ import numpy as np
 
 from cable.moving_end.block_solver import factor_wide, solve, solve_wide
 from cable.moving_end.state import DIAGONAL, LOWER, LOWER2, NEW, NOW, RESIDUAL, UPPER, UPPER2, Line, held_node
-from cable.properties import CableNumbers, StiffCableNumbers
+from cable.properties import CableNumbers, ClampedCableNumbers, StiffCableNumbers
 from subzero.jit import allocating, by_field, compiled, inner
 
 
@@ -102,10 +102,12 @@ def _add_shear(line: Line, j: int, stiffness: float, t: np.ndarray, r: np.ndarra
 
 @compiled
 def _add_to_balances(line: Line, j: int, i: int, q: float) -> None:
-    """Add a component of q_j: −q to node j, +q to node j−1, −q to the tow force."""
+    """Add a component of q_j: −q to node j, +q to node j−1, −q to the forces at the ends."""
     # The place of the held node is known: it has no balance.
     if j < held_node(line):
         line.rows[RESIDUAL, j, 1 + i] -= q
+    else:
+        line.ends.drum_force[i] -= q
     if j > 1:
         line.rows[RESIDUAL, j - 1, 1 + i] += q
     else:
@@ -134,6 +136,55 @@ def _add_to_matrix(line: Line, j: int, i: int, k: int, A: float, B: float, C: fl
         line.ends.tow.by_tow[i, k] += B
         if j < held:
             line.ends.tow.by_block[i, column] -= B - C
+
+
+@inner
+def _end_spring(line: Line, c: ClampedCableNumbers, end: int) -> tuple[int, float]:
+    """Return the segment at an end and k of its clamp. [N m]"""
+    j = line.ends.count if end else 1
+    return j, 2.0 * c.bending_stiffness / (
+        line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
+    )
+
+
+@inner
+def _add_clamps(line: Line, c: ClampedCableNumbers) -> None:
+    """Add the clamps of both ends."""
+    _clamp(line, c)
+
+
+@allocating
+def _clamp(line: Line, c: ClampedCableNumbers) -> None:
+    """Add the shear forces q = k P t_c/|d| of clamped ends, and their derivatives by the chord."""
+    t, r, q, clamp = np.empty((3, 3)), np.empty(3), np.empty(3), c.clamp
+    for end in range(2):
+        j, k = _end_spring(line, c, end)
+        _tangent(line, j, 1, t, r)
+        along = t[1, 0] * clamp[end, 0] + t[1, 1] * clamp[end, 1] + t[1, 2] * clamp[end, 2]
+        for i in range(3):
+            q[i] = k * (clamp[end, i] - along * t[1, i]) / r[1]
+            _add_to_balances(line, j, i, q[i])
+        for i in range(3):
+            for m in range(3):
+                P = (1.0 if i == m else 0.0) - t[1, i] * t[1, m]
+                B = -k * along * P / (r[1] * r[1]) - (t[1, i] * q[m] + q[i] * t[1, m]) / r[1]
+                _add_to_matrix(line, j, i, m, 0.0, B, 0.0)
+
+
+@inner
+def _clamp_energy(line: Line, c: ClampedCableNumbers) -> float:
+    """Return E_c of both ends at level NOW. [J]."""
+    total, x = 0.0, line.position[NOW]
+    for end in range(2):
+        j, k = _end_spring(line, c, end)
+        size, square, along = 0.0, 0.0, 0.0
+        for i in range(3):
+            d = x[j, i] - x[j - 1, i]
+            size += d * d
+            square += c.clamp[end, i] ** 2
+            along += d * c.clamp[end, i]
+        total += k * (square - along / sqrt(max(size, 1e-30)))
+    return total
 
 
 @inner
@@ -207,3 +258,5 @@ add_bending = by_field("bending_stiffness", _add_bending, _no_bending)
 solve_for_step = by_field("bending_stiffness", _stiff_solve, _solve)
 has_residual = by_field("bending_stiffness", _no_residual, _has_residual)
 bending_energy = by_field("bending_stiffness", _energy, _no_energy)
+add_clamps = by_field("clamp", _add_clamps, _no_bending)
+clamp_energy = by_field("clamp", _clamp_energy, _no_energy)

@@ -8,11 +8,13 @@ the one that is nearest to its place.
 from __future__ import annotations
 
 from math import sqrt
+from typing import Any
 
 import numpy as np
 
 from cable.moving_end.bdf2 import Weights
 from cable.moving_end.state import BEFORE, DIAGONAL, NEW, NOW, RESIDUAL, Line, find_section, held_node
+from cable.moving_end.wetting import dry_sphere
 from cable.properties import CableNumbers, SectionedCableNumbers
 from subzero.jit import by_field, by_field_at, by_field_in_step, compiled, inlined, inner
 
@@ -35,13 +37,35 @@ def body_node(line: Line, c: SectionedCableNumbers, b: int) -> int:
 
 
 @inner
+def _dry_body(line: Line, c: Any, j: int) -> tuple[float, float, float]:
+    """Return the dry share of body j at level NEW, a sphere, its derivative by depth [1/m] and its energy [m]."""
+    r = c.softness * c.body_radius[j]
+    if r <= 0.0:
+        return 0.0, 0.0, 0.0
+    depth = line.position[NEW, body_node(line, c, j), 2] + line.ends.origin[2] - c.surface_level
+    share, by_depth, energy = dry_sphere(depth / r)
+    return share, by_depth / r, energy * r
+
+
+@inner
+def _wet_body(line: Line, c: SectionedCableNumbers, j: int) -> tuple[float, float, float]:
+    """Return that it is in water."""
+    return 0.0, 0.0, 0.0
+
+
+dry_body = by_field_at("surface_level", _dry_body, _wet_body)
+
+
+@inner
 def _load_nodes(line: Line, c: SectionedCableNumbers, w: Weights, slopes: bool) -> None:
     """Add the bodies to the balances of their nodes."""
     for b in range(c.body_count):
         j = body_node(line, c, b)
         if j >= held_node(line):
             continue
-        m, added, drag, lift = c.body[b, 0], c.body[b, 1], c.body[b, 3], c.body[b, 4]
+        dry, by_depth, _ = dry_body(line, c, b)
+        m, added = c.body[b, 0], (1.0 - dry) * c.body[b, 1]
+        drag, lift = (1.0 - dry) * c.body[b, 3], (1.0 - dry) * c.body[b, 4]
         V, J, square = line.velocity, line.water, 0.0
         for i in range(3):
             square += (V[NEW, j, i] - J[NEW, j, i]) ** 2
@@ -58,7 +82,9 @@ def _load_nodes(line: Line, c: SectionedCableNumbers, w: Weights, slopes: bool) 
                 by_U -= 2.0 * lift * (V[NEW, j, k] - J[NEW, j, k]) if i == 2 else 0.0
                 by_U += (m + added) * w.a0 + drag * speed + lift * down if i == k else 0.0
                 D[1 + i, 1 + k] += by_U * w.b0
-        r[3] -= c.body[b, 2] + lift * square
+        r[3] -= c.body[b, 2] + lift * square + dry * c.body[b, 5]
+        if slopes:
+            D[3, 3] -= by_depth * c.body[b, 5]
 
 
 @inner
@@ -72,7 +98,9 @@ def _add_mass(line: Line, c: SectionedCableNumbers) -> None:
     for b in range(c.body_count):
         j = body_node(line, c, b)
         for i in range(3 if j < held_node(line) else 0):
-            line.blocks[DIAGONAL, j, 1 + i, 1 + i] += c.body[b, 0] + c.body[b, 1]
+            line.blocks[DIAGONAL, j, 1 + i, 1 + i] += (
+                c.body[b, 0] + (1.0 - dry_body(line, c, b)[0]) * c.body[b, 1]
+            )
 
 
 @inner
@@ -90,8 +118,9 @@ def _flow(line: Line, c: SectionedCableNumbers) -> tuple[float, float, float]:
             continue
         for i in range(3):
             square += (line.velocity[NOW, j, i] - line.water[NOW, j, i]) ** 2
-        loss += c.body[b, 3] * square * sqrt(square)
-        energy += 0.5 * (c.body[b, 0] + c.body[b, 1]) * square
+        dry, _, above = dry_body(line, c, b)
+        loss += (1.0 - dry) * c.body[b, 3] * square * sqrt(square)
+        energy += 0.5 * (c.body[b, 0] + (1.0 - dry) * c.body[b, 1]) * square + above * c.body[b, 5]
         sunk += c.body[b, 2] * (line.velocity[NOW, j, 2] - line.water[NOW, j, 2])
     return loss, energy, sunk
 
@@ -141,7 +170,7 @@ def steady_tow(line: Line, c: SectionedCableNumbers, U: np.ndarray, tail_drag: f
     t = -U / speed if speed > 0.0 else down
     for j in range(N, 0, -1):
         for b in (b for b, node in enumerate(nodes) if node == j):
-            _, _, weight, drag, lift = c.body[b]
+            _, _, weight, drag, lift, _ = c.body[b]
             force = force - drag * speed * U + weight * down + lift * (speed * speed * down - U[2] * U)
         find_section(line, c, j)
         length = float(line.length[j])
@@ -154,8 +183,9 @@ def steady_tow(line: Line, c: SectionedCableNumbers, U: np.ndarray, tail_drag: f
             )
             load = length * (c.weight * down - drag)
             middle = force + 0.5 * load
-            t = t + 0.5 * (middle / max(float(np.linalg.norm(middle)), 1e-30) - t)
-            t /= np.linalg.norm(t)
+            pulled = middle / max(float(np.linalg.norm(middle)), 1e-30)
+            t = t + 0.5 * (pulled - t)
+            t = t / np.linalg.norm(t) if t.any() else pulled  # none: it points against the pull
         T = float(np.linalg.norm(middle))
         line.tension[:, j], line.node_tension[j] = T, float(np.linalg.norm(force))
         x[j - 1] = x[j] - length * (1.0 + c.compliance * T) * t

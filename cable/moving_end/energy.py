@@ -12,7 +12,8 @@ G = ∫w_c U_k ds the work of gravity, and
                                          cable; at a free end, the loss of the drogue
     B   = −Σ F_B·U                       what the sea bed takes: it is pressed in, damps, and rubs
     M   = −ρA ∫ U_t U_⊥·(∂t/∂t) ds       (the paper's added mass is no gradient of an energy when the cable turns)
-    C   = ∫ m U·dJ/dt ds − ∫ T t·∂J/∂s ds    what a current that changes along the cable's way does; 0 in a uniform one
+    C   = ∫ m U·dJ/dt ds − ∫ T t·∂J/∂s ds    what a current that changes along the cable's way does; 0 in a uniform one,
+                                         and what a surface takes with the water that is wetted (`moving_end.surface`)
 
 M is the vector form of −(m1 − m)∫V_t V_n β̇ ds. It follows from U·∂(P U)/∂t = ∂(½U_⊥²)/∂t − U_t U_⊥·∂t/∂t, because
 U_⊥ has no component along t; and ∂t/∂t = ∂V/∂s across.
@@ -22,12 +23,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from cable.moving_end.bending import bending_energy
+from cable.moving_end.bending import bending_energy, clamp_energy
 from cable.moving_end.composition import body_flow
 from cable.moving_end.contact import power_to_bed
-from cable.moving_end.segment_load import Load, evaluate_load, measured_chord, take_segment
+from cable.moving_end.segment_load import Load, evaluate_load, mass_along, measured_chord, take_segment
 from cable.moving_end.slack_law import KNOWN
 from cable.moving_end.state import BEFORE, NOW, Line, select_section
+from cable.moving_end.surface import surface_energy, wetted_power
 from cable.properties import CableNumbers
 from subzero.jit import compiled, inlined, inner
 
@@ -65,7 +67,7 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
         energy += 0.5 * length * stored
         sunk += length * c.weight * (V[2] - J[2])
         added -= c.added_mass * work.along * turn * length / work.chord_length
-        carried += length * c.mass * _carried(line, j)
+        carried += length * (c.mass - mass_along(line, c)) * _carried(line, j)
     lost, held, fallen = body_flow(line, c)
     out[LOSS], out[STORED], out[GRAVITY_WORK], out[ADDED_MASS] = (
         loss + lost,
@@ -73,9 +75,14 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
         sunk + fallen,
         added,
     )
-    out[STRAINED], out[CARRIED], out[AT_DRUM], out[TOWED] = strained, carried, 0.0, 0.0
+    out[STRAINED], out[CARRIED], out[AT_DRUM], out[TOWED] = (
+        strained,
+        carried + wetted_power(line, c),
+        0.0,
+        0.0,
+    )
     out[DAMPED], out[TO_BED] = damped, power_to_bed(line, c)
-    out[STORED] += bending_energy(line, c)
+    out[STORED] += bending_energy(line, c) + clamp_energy(line, c) + surface_energy(line, c)
     _flow_at_ends(line, c, out)
 
 

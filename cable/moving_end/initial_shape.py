@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf, sqrt
 from typing import Any
 
@@ -209,18 +210,30 @@ def division(cable: AnyCable, length: float, each: float) -> int:
 
 def trail_on_bed(line: Line, bed: SeaBed | None) -> None:
     """Lay what would begin below the bed on it, in the direction in which it would have gone."""
+    if bed is not None:
+        _trail(line, lambda places: bed.below(places), bed.normal)
+
+
+def trail_on_surface(line: Line, surface: float | None) -> None:
+    """Lay what would begin above the surface on it, likewise."""
+    if surface is not None:
+        _trail(line, lambda places: surface - np.atleast_2d(places)[:, 2], np.array([0.0, 0.0, -1.0]))
+
+
+def _trail(line: Line, beyond: Callable[[np.ndarray], np.ndarray], n: np.ndarray) -> None:
+    """Lay what would begin beyond a plane with the unit normal n on it; `beyond` is how far places are (n,). [m]"""
     N, x, origin = line.ends.count, line.position[NOW], np.asarray(line.ends.origin)
-    if bed is None or bed.below(x[: N + 1] + origin).max() <= 0.0:
+    if beyond(x[: N + 1] + origin).max() <= 0.0:
         return
-    chords, away, n = np.diff(x[: N + 1], axis=0), x[N] - x[0], bed.normal
+    chords, away = np.diff(x[: N + 1], axis=0), x[N] - x[0]
     away = away - (away @ n) * n
     size = float(np.linalg.norm(away))
     away = away / size if size > 0.0 else first_direction(np.zeros((1, 3)))
     for j in range(1, N + 1):
         chord = float(np.linalg.norm(chords[j - 1]))
         x[j] = x[j - 1] + chords[j - 1]
-        if bed.below(x[j] + origin)[0] > 0.0:
-            down = min(max(-float(bed.below(x[j - 1] + origin)[0]), 0.0), chord)
+        if beyond(x[j] + origin)[0] > 0.0:
+            down = min(max(-float(beyond(x[j - 1] + origin)[0]), 0.0), chord)
             x[j] = x[j - 1] + down * n + np.sqrt(chord * chord - down * down) * away
     line.position[:, : N + 1] = x[: N + 1]
 

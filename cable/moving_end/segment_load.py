@@ -7,7 +7,9 @@ middle. With U = V − J, U_t = U·t, U_⊥ = U − U_t t and the projection P =
     D = √(1+eT) (½ρπdC_t |U_t| U_t t + ½ρdC_n |U_⊥| U_⊥)
 
 whose components along t, n, b are the six scalar equations of Feng & Allen (2004) as re-derived in
-`docs/theory.md`. No angle appears, so no direction is singular, and a turned motion gives turned forces.
+`docs/theory.md`. With added mass along the cable, too, p = m V + ρA (C_a U_⊥ + C_at U_t t), which is computed as
+(m + ρA C_at) V + ρA (C_a − C_at) U_⊥ − ρA C_at J: the first two have the form above. No angle appears, so no direction
+is singular, and a turned motion gives turned forces.
 
 `evaluate_load` fills q = a₀ p + D − w_c k, where a₀ is the weight of the newest value in the time derivative
 (`bdf2`), and `differentiate_load` ∂q/∂V and ∂q/∂d: all that Newton's method needs from the physics.
@@ -22,8 +24,8 @@ import numpy as np
 
 from cable.moving_end.slack_law import chord_length, squared_share, turning_rate
 from cable.moving_end.state import NOW, Line, select_section
-from cable.properties import CableNumbers
-from subzero.jit import Record, inlined, inner, made_once
+from cable.properties import AlongCableNumbers, CableNumbers
+from subzero.jit import Record, by_field, inlined, inner, made_once
 
 
 class Load(Record):
@@ -73,13 +75,31 @@ def new_load() -> Load:
 
 
 @inlined
+def _along(line: Line | Load, c: AlongCableNumbers) -> float:
+    """Return ρA C_at. [kg/m]"""
+    return c.mass_along
+
+
+@inlined
+def _none_along(line: Line | Load, c: CableNumbers) -> float:
+    """Return none. [kg/m]"""
+    return 0.0
+
+
+mass_along = by_field("mass_along", _along, _none_along)
+
+
+@inlined
 def evaluate_momentum(c: CableNumbers, work: Load) -> None:
     """Fill U_t, U_⊥ and p = m V + ρA U_⊥, the momentum per length, from velocity, water and tangent. [kg/s]."""
     V, J, t, across = work.velocity, work.water, work.tangent, work.across
+    carried = mass_along(work, c)
     along = (V[0] - J[0]) * t[0] + (V[1] - J[1]) * t[1] + (V[2] - J[2]) * t[2]
     for i in range(3):
         across[i] = V[i] - J[i] - along * t[i]
         work.momentum[i] = c.mass * V[i] + c.added_mass * across[i]
+        if carried > 0.0:
+            work.momentum[i] -= carried * J[i]
     work.along = along
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from cable.current import Water, water_velocity
 from cable.drum import TURNING
 from cable.moving_end.slack_law import SMOOTHING
-from cable.properties import CableNumbers, SectionedCableNumbers
+from cable.moving_end.wetting import dry_segment
+from cable.properties import CableNumbers, FloatingCableNumbers, SectionedCableNumbers
 from cable.schemes import TOLERANCE
 from subzero.jit import Record, by_field_at, compiled, inlined, inner, made_once
 
@@ -345,7 +346,7 @@ def find_section(line: Line, c: SectionedCableNumbers, j: int) -> None:
     row, c.section_now = c.section[k], k
     c.mass, c.added_mass, c.weight, c.compliance = row[0], row[1], row[2], row[3]
     c.retardation, c.tangential_drag, c.normal_drag = row[4], row[5], row[6]
-    c.bed_stiffness, c.bed_damping = row[7], row[8]
+    c.bed_stiffness, c.bed_damping, c.mass_along = row[7], row[8], row[9]
 
 
 @inner
@@ -353,5 +354,59 @@ def _is_uniform(line: Line, c: CableNumbers, j: int) -> None:
     """Select nothing."""
 
 
-select_section = by_field_at("section_end", find_section, _is_uniform)
-"""Make the numbers of a cable describe the section of a segment; a uniform cable compiles nothing of it."""
+_select_row = by_field_at("section_end", find_section, _is_uniform)
+
+
+@inner
+def _find_whole_section(line: Line, c: Any, j: int) -> None:
+    """Fill the numbers of a segment in water, which its section has."""
+    find_section(line, c, j)
+    row = c.section[c.section_now]
+    c.whole[0], c.whole[1], c.whole[2] = row[0] - row[9], row[1], row[9]
+    c.whole[3], c.whole[4], c.whole[5], c.whole[6] = row[5], row[6], row[10], row[11]
+
+
+find_whole = by_field_at("section_end", _find_whole_section, _is_uniform)
+"""Fill `FloatingCableNumbers.whole` for a segment."""
+
+
+@inlined
+def depth_in_radii(line: Line, c: FloatingCableNumbers, level: int, j: int) -> float:
+    """Return how deep node j is below the surface at a level, in radii of the cable. [-]"""
+    depth = line.position[level, j, 2] + line.ends.origin[2] - c.surface_level
+    return depth / (c.softness * 0.5 * c.whole[6])
+
+
+@inlined
+def _wet(line: Line, c: FloatingCableNumbers, level: int, j: int) -> None:
+    """Make c describe segment j with the water of its wetted share at a level."""
+    find_whole(line, c, j)
+    near, far, _, _, _ = dry_segment(depth_in_radii(line, c, level, j - 1), depth_in_radii(line, c, level, j))
+    share, whole = 1.0 - near - far, c.whole
+    c.mass, c.added_mass, c.mass_along = whole[0] + share * whole[2], share * whole[1], share * whole[2]
+    c.tangential_drag, c.normal_drag = share * whole[3], share * whole[4]
+
+
+@inner
+def _wet_now(line: Line, c: FloatingCableNumbers, j: int) -> None:
+    """Select a segment with its wetted share at level NOW."""
+    _wet(line, c, NOW, j)
+
+
+@inner
+def _wet_new(line: Line, c: FloatingCableNumbers, j: int) -> None:
+    """Select a segment with its wetted share at level NEW."""
+    _wet(line, c, NEW, j)
+
+
+@inner
+def _all_wet(line: Line, c: CableNumbers, j: int) -> None:
+    """Select the section of a segment."""
+    _select_row(line, c, j)
+
+
+select_section = by_field_at("surface_level", _wet_now, _all_wet)
+"""Make the numbers of a cable describe the section of a segment, and its wetted share at level NOW; a uniform cable in
+water everywhere compiles nothing of it."""
+wet_at_new = by_field_at("surface_level", _wet_new, _is_uniform)
+"""Do the same for the wetted share at level NEW."""

@@ -11,11 +11,13 @@ the error estimate.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
+from cable.clamps import Clamps
 from cable.current import Water
 from cable.drum import LENGTH, DrumNumbers, DrumProperties
 from cable.drum_motion import PLACE, SETPOINT, VELOCITY, drum_path, hermite, lead_drum, resting
@@ -29,6 +31,7 @@ from cable.moving_end.initial_shape import (
     start_in_water,
     steady_direction,
     trail_on_bed,
+    trail_on_surface,
 )
 from cable.moving_end.jolt import take_jolt
 from cable.moving_end.remeshing import accept, end_tensions
@@ -49,6 +52,7 @@ from cable.tow_path import (
     segments_needed,
 )
 from cable.winch import Brake, PayOutRate
+from subzero.errors import BadValueError
 from subzero.jit import compiled, inner, scratch
 
 MOST_HALVINGS = 10
@@ -236,7 +240,8 @@ def pull_out(task: PullOut, scheme: MovingEnd) -> History:
     line = new_line(_capacity(task, path, led, segment_length, scheme))
     line.ends.layout.segment_length, line.ends.layout.grading = segment_length, scheme.grading
     line.ends.solver.tolerance, line.ends.layout.run_in = scheme.tolerance, scheme.run_in
-    c, drum = task.cable.numbers(task.bed), task.drum.numbers()
+    c, drum = task.cable.numbers(task.bed, task.clamps, task.surface), task.drum.numbers()
+    _refuse_clamp(task.clamps, not isinstance(task.drum, Brake), "at the drum")
     line.ends.origin[:] = task.origin
     line.ends.solver.pulls_only = task.bed is not None and c.compliance > 0.0
     _refuse_below(task.bed, np.array([path.place[0], led[0, PLACE:VELOCITY]]) + task.origin)
@@ -247,7 +252,8 @@ def pull_out(task: PullOut, scheme: MovingEnd) -> History:
         lay_held(line, start, path.leaving[0], drum.velocity, rate)
     else:
         lay_straight(line, wet, direction, path.leaving[0], drum, c)
-    return _run(line, path, led, task.current.numbers(task.origin), c, drum, scheme.rtol)
+    run = _run(line, path, led, task.current.numbers(task.origin), c, drum, scheme.rtol)
+    return run if task.surface is None else replace(run, has_surface=True)
 
 
 def tow(task: Tow, scheme: MovingEnd) -> History:
@@ -256,7 +262,12 @@ def tow(task: Tow, scheme: MovingEnd) -> History:
     segments_needed(task.length, scheme.segment_length, 0.0)  # refuses a cable of countless ones
     count = division(task.cable, task.length, scheme.segment_length)
     check_memory(path.times.size, count)
-    line, c, idle = new_line(count), task.cable.numbers(task.bed), DrumProperties().numbers()
+    line, c, idle = (
+        new_line(count),
+        task.cable.numbers(task.bed, task.clamps, task.surface),
+        DrumProperties().numbers(),
+    )
+    _refuse_clamp(task.clamps, True, "at the free tail")
     _refuse_below(task.bed, np.zeros((1, 3)))
     J, tail_drag = task.current.at((0.0, 0.0, 0.0)), task.tail_drag
     uphill = steady_direction(path.leaving, J, task.cable, tail_drag)
@@ -269,13 +280,24 @@ def tow(task: Tow, scheme: MovingEnd) -> History:
     # Places are counted from the tail: with this origin the tow point starts at (0, 0, 0), where J was taken.
     origin = line.ends.origin[:] = -line.position[NOW, 0]
     trail_on_bed(line, task.bed)
-    return _run(line, path, resting(path.times), task.current.numbers(origin), c, idle, scheme.rtol)
+    trail_on_surface(line, task.surface)
+    run = _run(line, path, resting(path.times), task.current.numbers(origin), c, idle, scheme.rtol)
+    return run if task.surface is None else replace(run, has_surface=True)
 
 
 def _refuse_below(bed: SeaBed | None, ends: np.ndarray) -> None:
     """Raise an error if an end (n, 3) of a cable is below the bed."""
     if bed is not None:
         bed.refuse_below(ends, "pull_out or tow")
+
+
+def _refuse_clamp(clamps: Clamps | None, cannot: bool, where: str) -> None:
+    """Raise an error for a clamp at a second end that is free, or where cable passes."""
+    if clamps is not None and clamps.second is not None and cannot:
+        raise BadValueError(
+            f"pull_out or tow: the second end is clamped {where}; only what a cable.Brake holds can be. Leave"
+            " Clamps.second out, or hold that end by drum=cable.Brake()."
+        )
 
 
 def led_drum(task: PullOut, times: np.ndarray) -> np.ndarray:

@@ -67,8 +67,11 @@ class Record(Memory):
         taken = [name for name in added if hasattr(np.void, name)]
         if taken:
             raise TypeError(f"{cls.__name__}: every record has {', '.join(taken)} already. Take other names.")
-        cls.names = (*added, *cls.names)
-        cls.defaults = cls.defaults | {name: cls.__dict__[name] for name in added if name in cls.__dict__}
+        inherited = [name for base in cls.__bases__ for name in getattr(base, "names", ())]
+        # Of several bases with a common one, the fields of that come last.
+        cls.names = (*added, *reversed(dict.fromkeys(reversed(inherited))))
+        defaults = {k: v for base in cls.__bases__ for k, v in getattr(base, "defaults", {}).items()}
+        cls.defaults = defaults | {name: cls.__dict__[name] for name in added if name in cls.__dict__}
         for name in cls.defaults.keys() & cls.__dict__.keys():
             delattr(cls, name)  # a class attribute would hide the field
 

@@ -131,6 +131,33 @@ def test_bending_stiffness_raises_the_harmonics_of_a_hinged_string():
     assert_allclose(2.0 * np.pi * taut(stiff).modes(6).frequencies, string_omega(n) * raised, rtol=9.5 * FINE)
 
 
+def test_clamped_ends_hold_a_stiff_string_at_second_order():
+    """1 − cosh(aL) cos(bL) + (a² − b²)/(2ab) sinh(aL) sin(bL) = 0, a² − b² = T/EI, ab = ω √(m/EI)."""
+    EI = 20.0
+    stiff = cable.CableProperties(
+        mass_per_length=0.1, cross_section_area=2e-5, compliance=1e-7, bending_stiffness=EI
+    )
+
+    def zero(w):
+        half, ab = 0.5 * TENSION / EI, w * np.sqrt(stiff.virtual_mass_per_length / EI)
+        a, b = np.sqrt(np.hypot(half, ab) + half), np.sqrt(np.hypot(half, ab) - half)
+        return (
+            1.0 / np.cosh(a * LENGTH)
+            - np.cos(b * LENGTH)
+            + half / ab * np.tanh(a * LENGTH) * np.sin(b * LENGTH)
+        )
+
+    hinged = string_omega(1) * np.sqrt(1.0 + (np.pi / LENGTH) ** 2 * EI / TENSION)
+    exact = brentq(zero, 1.01 * hinged, 2.0 * hinged)
+    both = cable.Clamps(first=(1.0, 0.0, 0.0), second=(-1.0, 0.0, 0.0))
+    found = [taut(stiff, n, clamps=both).modes(1).frequencies[0] * 2.0 * np.pi for n in (20, 40, 80)]
+    errors = np.abs(np.array(found) / exact - 1.0)
+    assert (orders(errors) > 1.8).all()
+    assert errors[-1] < 2e-3
+    one = taut(stiff, clamps=cable.Clamps(first=(1.0, 0.0, 0.0))).modes(1).frequencies[0] * 2.0 * np.pi
+    assert hinged < one < found[-1]
+
+
 def test_a_body_in_the_middle_lowers_the_odd_harmonics():
     """The wave number solves k tan(kL/2) = 2 m1/M; the even modes have a node there."""
     body = cable.Body(0.5 * LENGTH, mass=0.7, volume=4e-4)
@@ -255,6 +282,9 @@ def test_what_has_no_modes_is_refused():
         cable.hold(ends, 10.0).modes()
     with pytest.raises(UserError, match="nothing brings the cable back to its shape"):
         cable.Tether(ends=ends).modes()
+    with pytest.raises(UserError, match="part of the cable is at the free surface"):
+        taut(STRING, surface=0.0).modes()
+    assert taut(STRING, surface=-1.0).modes(1).frequencies.size == 1
     with pytest.raises(UserError, match="2000 segments; at most 1000"):
         taut(STRING, 2000).modes()
     with pytest.raises(UserError, match="count is 0; it must be a whole number of at least 1"):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from cable import CableProperties, DrumProperties, SeaBed
+from cable import CableProperties, Clamps, DrumProperties, SeaBed
 from cable.current import Current
 from cable.drum import SPINNING, STANDING, TURNING
 from cable.moving_end.assembly import assemble
@@ -164,6 +164,55 @@ def test_bending_has_its_jacobian_right_too(segments):
     line, work = bent_line(segments, TURNING, 2, c=STIFF)
     weights = backward_weights.py_func(0.1, 0.1)
     numeric, _ = differences(line, work, weights, STIFF)
+    analytic = dense(line)
+    numeric[-2:] = analytic[-2:]
+    largest = np.abs(analytic).max(axis=1, keepdims=True)
+    assert_allclose(analytic / largest, numeric / largest, rtol=0, atol=2e-6)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("level", [-0.05, 0.02, 0.1])
+def test_a_free_surface_has_its_jacobian_right_too(level):
+    """Thick segments in and through the surface; without the arc's corrections, which its slopes leave out."""
+    thick = CableProperties(mass_per_length=0.02, cross_section_area=1e-2, compliance=0.05, diameter=0.1)
+    c = thick.numbers(surface=level)
+    line, work = bent_line(5, TURNING, 4, c=c)
+    line.slip[:], line.normal_gain[:] = 0.0, 1.0
+    weights = backward_weights.py_func(0.1, 0.1)
+    numeric, _ = differences(line, work, weights, c)
+    analytic = dense(line)
+    numeric[-2:] = analytic[-2:]
+    largest = np.abs(analytic).max(axis=1, keepdims=True)
+    last = 4 * line.ends.count - 8  # where the growing segment has its length, its dry weight is left out
+    assert_allclose(analytic[:last] / largest[:last], (numeric / largest)[:last], rtol=0, atol=5e-6)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("segments", [2, 4])
+def test_clamped_ends_have_their_jacobian_right_too(segments):
+    stiff = CableProperties(mass_per_length=0.02, compliance=0.05, bending_stiffness=0.05)
+    c = stiff.numbers(clamps=Clamps(first=(-1.0, 0.3, 0.1), second=(0.5, 0.2, -0.3)))
+    line, work = bent_line(segments, TURNING, 2, c=c)
+    weights = backward_weights.py_func(0.1, 0.1)
+    numeric, _ = differences(line, work, weights, c)
+    analytic = dense(line)
+    numeric[-2:] = analytic[-2:]
+    largest = np.abs(analytic).max(axis=1, keepdims=True)
+    assert_allclose(analytic / largest, numeric / largest, rtol=0, atol=2e-6)
+
+
+@pytest.mark.parametrize("mode", [TURNING, STANDING], ids=["turning", "standing"])
+def test_added_mass_along_has_its_jacobian_right_too(mode):
+    c = CableProperties(
+        mass_per_length=0.02,
+        compliance=0.05,
+        diameter=0.01,
+        cross_section_area=1e-4,
+        tangential_added_mass_coefficient=0.5,
+    ).numbers()
+    line, work = bent_line(4, mode, 6, c=c)
+    weights = backward_weights.py_func(0.1, 0.07)
+    numeric, _ = differences(line, work, weights, c)
     analytic = dense(line)
     numeric[-2:] = analytic[-2:]
     largest = np.abs(analytic).max(axis=1, keepdims=True)

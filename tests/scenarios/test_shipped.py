@@ -111,6 +111,8 @@ def test_the_cable_is_table_1_and_the_drum_that_of_section_4():
         "diameter": 0.0025,
         "tangential_drag_coefficient": 0.01,
         "normal_drag_coefficient": 1.0,
+        "added_mass_coefficient": 1.0,
+        "tangential_added_mass_coefficient": 0.0,
         "compliance": 0.0,
         "internal_damping": 0.0,
         "bending_stiffness": 0.0,
