@@ -162,12 +162,14 @@ def _fits(value: Any, hint: Any) -> bool:
 
 def _takes(function: Any, arguments: Collection[Any]) -> bool:
     """Return whether a value can be called with so many arguments, as far as Python knows."""
+    if not callable(function):  # `inspect` would ask for its text, which may itself be wrong
+        return False
     try:
         inspect.signature(function).bind(*arguments)
     except TypeError:
         return False
-    except ValueError:  # a built-in one
-        return callable(function)
+    except ValueError:  # a built-in one, of which it knows nothing
+        pass
     return True
 
 

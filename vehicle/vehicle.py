@@ -105,7 +105,7 @@ class Vehicle:
             Problem(
                 key=name, found=short(getattr(self, name)), why="this is no such part", allowed=kind.__name__
             )
-            for name, kind in SECTIONS.items()
+            for name, kind in {**SECTIONS, DERIVATIVES: Derivatives}.items()
             if not isinstance(getattr(self, name), kind)
         ]
         problems = problems or inconsistencies(self.hull, self.added_mass, self.derivatives)

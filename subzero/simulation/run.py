@@ -118,7 +118,7 @@ def simulate_plainly(
     Its results are all that the trial asks for, however many.
     """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
-    model, tethered = model_of(trial, model), bool(tethered)
+    model, tethered, later = model_of(trial, model), bool(tethered), tuple(later)
     with _kept(checkpoint, trial, model, tethered, later) as keeper:
         budget = Budget(trial.budget)
         run, accuracy = _as_fine_as_asked(trial, model, tethered, budget, progress, later, keeper)
