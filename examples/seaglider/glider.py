@@ -32,9 +32,9 @@ def glider(p, u, t):
     for _ in range(12):
         q = np.maximum(0.5 * u["density"] * speed**2, 0.05)
         slope = np.copysign(np.maximum(np.abs(np.tan(path)), 0.05), path)
-        drag = p["drag"] * DRAG * q**EXPONENT
-        share = np.clip(4.0 * drag * INDUCED / (LIFT * slope) ** 2, 0.0, 0.95)
-        attack = -LIFT * slope / (2.0 * INDUCED) * (1.0 - np.sqrt(1.0 - share))  # [deg]
+        drag, lift = p["drag"] * DRAG * q**EXPONENT, p["lift"] * LIFT
+        share = np.clip(4.0 * drag * INDUCED / (lift * slope) ** 2, 0.0, 0.95)
+        attack = -lift * slope / (2.0 * INDUCED) * (1.0 - np.sqrt(1.0 - share))  # [deg]
         path = pitch - np.radians(attack)
         square = 2.0 * force * np.sin(path) / (u["density"] * LENGTH**2 * (drag + INDUCED * attack**2))
         speed = np.sqrt(np.maximum(square, 1e-6))
@@ -55,6 +55,7 @@ def model(*, second=True, trusted=False):
         inputs=["buoyancy", "pitch", "density"],
         parameters=[
             sd.Number("drag", 1.0, tolerance=0.05, low=0.2, high=5.0),
+            sd.Number("lift", 1.0, tolerance=0.1, low=0.2, high=5.0),
             sd.Number("volume", 0.0, tolerance=10.0, unit="cc"),
             sd.Number("pitch_bias", 0.0, tolerance=0.3, unit="deg"),
             sd.Start("depth0", 60.0, tolerance=60.0, unit="m"),  # of no gauge: both are under suspicion
@@ -65,7 +66,7 @@ def model(*, second=True, trusted=False):
             sd.Cause("pitch", "the pitch sensor has an offset", changes={"pitch_bias": 2.0}),
         ],
         unknown=[sd.Unknown("vertical_speed", size=0.02, time=30.0)],
-        tuned_on={"drag": ["gauge"], "volume": ["gauge"]},
+        tuned_on={"drag": ["gauge"], "lift": ["gauge"], "volume": ["gauge"]},
         batch=True,
     )
 

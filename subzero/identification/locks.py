@@ -17,8 +17,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from subzero.identification.explanation import Entry, Term, Terms, without
+from subzero.identification.explanation import CLOCK, Entry, Term, Terms, without
 from subzero.identification.fit import Fit, free_fit
+from subzero.identification.model import COMMAND
 from subzero.identification.problem import Problem
 from subzero.identification.record import Record
 
@@ -74,13 +75,21 @@ def locks(problem: Problem, best: Fit, held_out: Sequence[Record]) -> dict[str, 
 
 def _locks(problem: Problem, best: Fit, term: Term, held_out: Sequence[Record]) -> Locks:
     gain = held_out_gain(problem, best, term, held_out)
-    reasons = []
+    reasons = [f"{name} may as well act late or early" for name in _late_commands(problem, term)]
     if gain is not None and not gain.holds:
         reasons.append(
             f"it does not surely predict {gain.what}: {gain.before:.2f} levels of the sensors without it, "
             f"{gain.after:.2f} with it"
         )
     return Locks(gain, tuple(reasons))
+
+
+def _late_commands(problem: Problem, term: Term) -> list[str]:
+    """Return the commands that may as well act late: those that may be off, if all readings are late together."""
+    if term.kind != "delay" or (term.target != CLOCK and len(problem.channels) > 1):
+        return []
+    names = [each.name for each in problem.model.unknown]
+    return [name.removeprefix(COMMAND) for name in names if name.startswith(COMMAND)]
 
 
 def held_out_gain(problem: Problem, best: Fit, term: Term, held_out: Sequence[Record]) -> Gain | None:

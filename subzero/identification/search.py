@@ -116,14 +116,21 @@ class Search:
     def _expand(self, base: Fit) -> None:
         """Fit the best explanations that are one move away."""
         self._expanded.add(key(base.terms))
-        for linear in self._best_additions(base.linear):
-            self._fit(linear.terms, linear, self._linear_score(linear))
+        self._fit_additions(base.linear)
         for term in base.terms:
             smaller = self._fit(without(base.terms, term), base.linear)
-            for linear in self._best_additions(smaller.linear):
-                self._fit(linear.terms, linear, self._linear_score(linear))
+            self._fit_additions(smaller.linear)
             for twin in self._twins(term):
                 self._fit(with_term(smaller.terms, twin), base.linear)
+
+    def _fit_additions(self, base: Linear) -> None:
+        """Fit the best explanations with one term more, down to those ranked far below the best that was fitted: far
+        from its point a linear problem may promise much that no simulation holds.
+        """
+        least = self._linear_score(base) - WORTH
+        for score, linear in self._best_additions(base)[:FITTED]:
+            if score > least:
+                least = max(least, self.score(self._fit(linear.terms, linear, score)) - WITHIN)
 
     def _twins(self, term: Term) -> Iterator[Term]:
         """Yield the same error, undone, of other channels of its unit: two gauges differ, and either may be wrong."""
@@ -179,33 +186,24 @@ class Search:
     def _linear_score(self, linear: Linear) -> float:
         return linear.evidence(self.problem)[1] + log_prior(linear.terms, self._loggers)
 
-    def _best_additions(self, base: Linear) -> list[Linear]:
-        """Return explanations with one term more, ranked with their own noise, that may be worth a fit."""
+    def _best_additions(self, base: Linear) -> list[tuple[float, Linear]]:
+        """Return explanations with one term more with their scores, ranked with their own noise."""
         if len(base.terms) >= MOST_TERMS:
             return []
-        here = self._linear_score(base)
         again = []
         for linear in self._worth_own_noise(self._additions(base)):
             own = replace(linear, levels=fitted_levels(self.problem, linear, sweeps=1))
             again.append((self._linear_score(own), own))
-        again.sort(key=lambda pair: -pair[0])
-        least = max(here - WORTH, again[0][0] - WITHIN) if again else here
-        return [linear for score, linear in again[:FITTED] if score > least]
+        return self._distinct(sorted(again, key=lambda pair: -pair[0]))
 
     def _worth_own_noise(self, ranked: list[tuple[float, Linear]]) -> Iterator[Linear]:
-        """Yield the best, ranked with the noise of the explanation that they are added to, and with usual noise: what a
-        term would explain may be part of the former.
+        """Yield the best, ranked with the noise of the explanation that they are added to, and ranked with usual noise,
+        from which their own is then sought: what a term would explain may be part of the former.
         """
-        quiet = [
-            (self._linear_score(replace(each, levels=quieter(self.problem, each.levels))), each)
-            for _, each in ranked
-        ]
-        quiet.sort(key=lambda pair: -pair[0])
-        found: dict[Key, Linear] = {}
+        calm = [replace(each, levels=quieter(self.problem, each.levels)) for _, each in ranked]
+        quiet = sorted(((self._linear_score(each), each) for each in calm), key=lambda pair: -pair[0])
         for order in (ranked, quiet):
-            for _, linear in self._distinct(order)[:RANKED_AGAIN]:
-                found.setdefault(key(linear.terms), linear)
-        yield from found.values()
+            yield from (linear for _, linear in self._distinct(order)[:RANKED_AGAIN])
 
     def _distinct(self, ranked: Iterable[tuple[float, Linear]]) -> list[tuple[float, Linear]]:
         found: dict[Key, tuple[float, Linear]] = {}

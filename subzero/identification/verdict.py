@@ -142,7 +142,7 @@ class Verdict:
             lines += ["", sentence]
         for each in self.suspected:
             why = "; ".join(each.against) or f"its probability is {shown_probability(each.probability)}"
-            lines += ["", f"Not named: {each.sentence}: {why}."]
+            lines += ["", f"Not named: {each.sentence}{_sizes_shown(each)}: {why}."]
         lines += ["", "Explanations, the most probable first:"]
         lines += [
             f"  {shown_probability(p):>7}  {name}" for name, p in list(self.explanations.items())[:SHOWN]
@@ -237,6 +237,11 @@ def _named_lines(each: Named) -> list[str]:
             f"  in {g.what}, free simulation leaves {g.after:.2f} levels of the sensors, {g.before:.2f} without it"
         )
     return lines
+
+
+def _sizes_shown(each: Named) -> str:
+    sizes = ", ".join(f"{e.name} = {e.value:.4g} ± {e.sd:.2g}" for e in each.estimates)
+    return f" ({sizes})" if sizes else ""
 
 
 def _budget_lines(budget: tuple[Share, ...], remainder: str) -> list[str]:

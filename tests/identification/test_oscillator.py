@@ -99,10 +99,26 @@ def test_a_clock_that_is_late_against_the_inputs_is_found_with_its_delay():
     seen = record(3)
     late = 0.3
     x = np.interp(seen.time - late, seen.time, seen.columns["x"])
-    verdict = sd.diagnose(changed(seen, x=x), model())
+    verdict = sd.diagnose(changed(seen, x=x), model(unknown=False))
     (found,) = verdict.named
     assert found.id == "delay:x"
     assert estimate(verdict, "delay").value == pytest.approx(late, abs=0.02)
+
+
+@pytest.mark.long
+def test_a_command_that_may_be_off_may_as_well_be_what_is_late():
+    """With one channel and one clock, a late drive and a late sensor give the same readings."""
+    seen = record(3)
+    x = np.interp(seen.time - 0.3, seen.time, seen.columns["x"])
+    verdict = sd.diagnose(changed(seen, x=x), model())
+    assert verdict.named == ()
+    assert verdict.verdict == "undecided"
+    (late,) = verdict.suspected
+    assert late.id == "delay:x"
+    (delay,) = late.estimates
+    assert delay.value == pytest.approx(0.3, abs=0.02)
+    assert "Not named: x is late or early against the inputs (delay = " in str(verdict)
+    assert "force may as well act late or early" in str(verdict)
 
 
 @pytest.mark.long
