@@ -70,7 +70,8 @@ LEGAL = {
         "hold.current hold.segment_length hold.start load_scenario.commands_csv load_scenario.motion_csv "
         "plan_sweep.changes pull_out.cable pull_out.current pull_out.drum simulate.checkpoint simulate.every "
         "simulate.model simulate.progress simulate_many.every simulate_many.progress simulate_many.workers "
-        "tow.cable tow.current pull_out.bed tow.bed hold.bed",
+        "tow.cable tow.current pull_out.bed tow.bed hold.bed pull_out.clamps tow.clamps hold.clamps "
+        "pull_out.surface tow.surface hold.surface",
     "[]":
         "simulate.later simulate_many.trials compare.later check.later read_trials.paths catalogue.channels "
         "catalogue.more all_effects.more calibration.read.records Kept.scalars Kept.channels",
@@ -84,7 +85,7 @@ LEGAL = {
         "extended_toml.effects unseen.effects warnings_of.run plan_sweep.changes TetheredHeading.reset.options",
     "-1":
         "with_onset.time with_free_onset.time with_free_onset.end TetheredHeading.propeller_rps turn.turn "
-        "TetheredHeading.step.action Current.at.time",
+        "TetheredHeading.step.action Current.at.time pull_out.surface tow.surface hold.surface",
     "{x: None}":
         "TetheredHeading.reset.options",
 }  # fmt: skip
