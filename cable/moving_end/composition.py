@@ -13,16 +13,20 @@ from typing import Any
 import numpy as np
 
 from cable.moving_end.bdf2 import Weights
-from cable.moving_end.state import BEFORE, DIAGONAL, NEW, NOW, RESIDUAL, Line, find_section, held_node
+from cable.moving_end.state import (
+    BEFORE,
+    DIAGONAL,
+    NEW,
+    NOW,
+    RESIDUAL,
+    Line,
+    find_section,
+    held_node,
+    length_at,
+)
 from cable.moving_end.wetting import dry_sphere
 from cable.properties import CableNumbers, SectionedCableNumbers
-from subzero.jit import by_field, by_field_at, by_field_in_step, compiled, inlined, inner
-
-
-@inlined
-def _length(line: Line, j: int) -> float:
-    """Return the length of segment j at level NOW. [m]."""
-    return line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
+from subzero.jit import by_field, by_field_at, by_field_in_step, compiled, inner
 
 
 @compiled
@@ -30,8 +34,8 @@ def body_node(line: Line, c: SectionedCableNumbers, b: int) -> int:
     """Return the node that body b is at."""
     along = 0.0
     for j in range(1, line.ends.count + 1):
-        along += _length(line, j)
-        if along + 0.5 * _length(line, min(j + 1, line.ends.count)) > c.body_place[b]:
+        along += length_at(line, NOW, j)
+        if along + 0.5 * length_at(line, NOW, min(j + 1, line.ends.count)) > c.body_place[b]:
             return j
     return line.ends.count
 

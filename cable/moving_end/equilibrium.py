@@ -31,14 +31,7 @@ from cable.moving_end.composition import carried_weight
 from cable.moving_end.remeshing import fill_node_tensions
 from cable.moving_end.segment_load import Load, evaluate_load, measured_chord, segment_momentum, take_segment
 from cable.moving_end.slack_law import SMOOTHING, SOFTEST
-from cable.moving_end.state import (
-    BEFORE,
-    NEW,
-    NOW,
-    Line,
-    sample_water,
-    select_section,
-)
+from cable.moving_end.state import BEFORE, NEW, NOW, Line, length_at, sample_water, select_section
 from cable.moving_end.time_step import solve_step
 from cable.properties import CableNumbers
 from cable.schemes import TOLERANCE
@@ -61,12 +54,6 @@ LOOKS = 400
 """So many steps of continuation, at most."""
 FIRST, LONGEST, SHORTEST = 0.1, 1e4, 1e-7
 """The first, longest and shortest step of continuation; beyond the longest inertia is left out. [s]"""
-
-
-@inner
-def _length(line: Line, j: int) -> float:
-    """Return the length of segment j. [m]."""
-    return line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
 
 
 @allocating
@@ -94,7 +81,7 @@ def hang(line: Line, water: Water, c: CableNumbers, work: Load) -> float:
     # The direction of the cable is not known yet: the largest drag, square to the water, is the first load.
     for j in range(1, N + 1):
         _load_across(line, j, c, work)
-        whole += _length(line, j)
+        whole += length_at(line, NOW, j)
     for _ in range(DRAG_ROUNDS):
         _close(line, F, c.compliance, whole)
         _lay(line, F, c.compliance)
@@ -102,13 +89,13 @@ def hang(line: Line, water: Water, c: CableNumbers, work: Load) -> float:
         for j in range(1, N + 1):
             take_segment(line.position[NEW], line.velocity[NEW], line.water[NEW], j, work)
             work.square, work.chord_length, work.shorter = measured_chord(
-                line.position[NEW], j, _length(line, j)
+                line.position[NEW], j, length_at(line, NOW, j)
             )
             select_section(line, c, j)
             evaluate_load(line.tension[NEW, j], 0.0, 1.0, 0.0, c, work)
             for i in range(3):
                 # Half of the change, so that shape and drag settle instead of alternating.
-                line.load[j, i] += 0.5 * (_length(line, j) * work.q[i] - line.load[j, i])
+                line.load[j, i] += 0.5 * (length_at(line, NOW, j) * work.q[i] - line.load[j, i])
             line.load[j, 2] -= 0.5 * carried_weight(line, c, j)
     _keep(line, c, work)
     for j in range(1, N + 1):
@@ -125,8 +112,8 @@ def _load_across(line: Line, j: int, c: CableNumbers, work: Load) -> None:
     for i in range(3):
         square += J[i] * J[i]
     for i in range(3):
-        line.load[j, i] = -_length(line, j) * c.normal_drag * sqrt(square) * J[i]
-    line.load[j, 2] -= _length(line, j) * c.weight
+        line.load[j, i] = -length_at(line, NOW, j) * c.normal_drag * sqrt(square) * J[i]
+    line.load[j, 2] -= length_at(line, NOW, j) * c.weight
     line.load[j, 2] -= carried_weight(line, c, j)
 
 
@@ -183,7 +170,7 @@ def _complementary(
         for k in range(3):
             hessian[i, k] = 0.0
     for j in range(1, N + 1):
-        square, length = 0.0, _length(line, j)
+        square, length = 0.0, length_at(line, NOW, j)
         for i in range(3):
             load[i] += 0.5 * line.load[j, i]
             square += load[i] * load[i]
@@ -243,7 +230,9 @@ def _lay(line: Line, F: np.ndarray, e: float) -> None:
         T = sqrt(x[NEW, j, 0] ** 2 + x[NEW, j, 1] ** 2 + x[NEW, j, 2] ** 2)
         line.tension[NEW, j] = T
         for i in range(3):
-            x[NEW, j, i] = x[NEW, j - 1, i] + _length(line, j) * (1.0 + e * T) * x[NEW, j, i] / max(T, 1e-30)
+            x[NEW, j, i] = x[NEW, j - 1, i] + length_at(line, NOW, j) * (1.0 + e * T) * x[NEW, j, i] / max(
+                T, 1e-30
+            )
     for i in range(3):
         open_by = x[NOW, N, i] - x[NEW, N, i]
         for j in range(1, N + 1):
@@ -268,7 +257,7 @@ def _keep(line: Line, c: CableNumbers, work: Load) -> None:
         line.ends.last_length[level] = line.ends.last_length[NOW]
     for level in (NOW, BEFORE):
         for j in range(1, N + 1):
-            segment_momentum(line, level, j, _length(line, j), c, work)
+            segment_momentum(line, level, j, length_at(line, NOW, j), c, work)
 
 
 @compiled

@@ -23,7 +23,17 @@ from cable.moving_end.block_solver import solve
 from cable.moving_end.composition import add_body_masses
 from cable.moving_end.segment_load import Load, segment_momentum
 from cable.moving_end.slack_law import chord_length, squared_share
-from cable.moving_end.state import BEFORE, DIAGONAL, LOWER, NOW, RESIDUAL, UPPER, Line, select_section
+from cable.moving_end.state import (
+    BEFORE,
+    DIAGONAL,
+    LOWER,
+    NOW,
+    RESIDUAL,
+    UPPER,
+    Line,
+    length_at,
+    select_section,
+)
 from cable.properties import CableNumbers
 from subzero.jit import allocating, inlined, inner
 
@@ -78,18 +88,12 @@ def take_jolt(
 
 
 @inner
-def _length(line: Line, j: int) -> float:
-    """Return the length of segment j. [m]."""
-    return line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
-
-
-@inner
 def _fill_tangents(line: Line, tangents: np.ndarray) -> None:
     """Fill the tangents of all segments (segments + 1, 3)."""
     for j in range(1, line.ends.count + 1):
         for i in range(3):
             tangents[j, i] = line.position[NOW, j, i] - line.position[NOW, j - 1, i]
-        length = _length(line, j)
+        length = length_at(line, NOW, j)
         r = chord_length(squared_share(tangents[j], length), length)
         for i in range(3):
             tangents[j, i] /= r
@@ -98,7 +102,7 @@ def _fill_tangents(line: Line, tangents: np.ndarray) -> None:
 @inner
 def _mass(line: Line, tangents: np.ndarray, j: int, c: CableNumbers, out: np.ndarray) -> None:
     """Fill out (3, 3) with ∂P/∂V of segment j. [kg]."""
-    length, t = _length(line, j), tangents[j]
+    length, t = length_at(line, NOW, j), tangents[j]
     select_section(line, c, j)
     for i in range(3):
         for k in range(3):
@@ -201,4 +205,4 @@ def _apply(line: Line, tangents: np.ndarray, change: np.ndarray, c: CableNumbers
     # Differences of second order across the jump would be wrong: the next step has no past.
     line.ends.previous_step = 0.0
     for j in range(1, N + 1):
-        segment_momentum(line, NOW, j, _length(line, j), c, work)
+        segment_momentum(line, NOW, j, length_at(line, NOW, j), c, work)

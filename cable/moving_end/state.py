@@ -325,9 +325,9 @@ def sample_water(line: Line, water: Water, time: float) -> None:
 
 
 @inlined
-def _now_length(line: Line, j: int) -> float:
-    """Return the length of segment j at level NOW. [m]."""
-    return line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
+def length_at(line: Line, level: int, j: int) -> float:
+    """Return the length of segment j at a level of time: only the one at the drum grows. [m]."""
+    return line.ends.last_length[level] if j == line.ends.count else line.length[j]
 
 
 @compiled
@@ -336,11 +336,11 @@ def find_section(line: Line, c: SectionedCableNumbers, j: int) -> None:
     if j != c.section_segment + 1:  # no loop along the cable: count from the tow point
         c.section_along = 0.0
         for before in range(1, j):
-            c.section_along += _now_length(line, before)
-    k, middle = 0, c.section_along + 0.5 * _now_length(line, j)
+            c.section_along += length_at(line, NOW, before)
+    k, middle = 0, c.section_along + 0.5 * length_at(line, NOW, j)
     while middle > c.section_end[k]:
         k += 1
-    c.section_along, c.section_segment = c.section_along + _now_length(line, j), j
+    c.section_along, c.section_segment = c.section_along + length_at(line, NOW, j), j
     if k == c.section_now:
         return
     row, c.section_now = c.section[k], k

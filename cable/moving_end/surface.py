@@ -27,16 +27,11 @@ from cable.moving_end.state import (
     depth_in_radii,
     find_whole,
     held_node,
+    length_at,
 )
 from cable.moving_end.wetting import dry_energy, dry_segment
 from cable.properties import CableNumbers, FloatingCableNumbers
-from subzero.jit import by_field, by_field_in_step, compiled, inlined, inner, scratch
-
-
-@inlined
-def _length(line: Line, level: int, j: int) -> float:
-    """Return the length of segment j at a level. [m]."""
-    return line.ends.last_length[level] if j == line.ends.count else line.length[j]
+from subzero.jit import by_field, by_field_in_step, compiled, inner, scratch
 
 
 @inner
@@ -48,7 +43,7 @@ def _float(line: Line, c: FloatingCableNumbers, w: Weights, slopes: bool) -> Non
         r = c.softness * 0.5 * c.whole[6]
         a, b = depth_in_radii(line, c, NEW, j - 1), depth_in_radii(line, c, NEW, j)
         near, far, by_near, across, by_far = dry_segment(a, b)
-        buoyancy = c.whole[5] * _length(line, NEW, j)
+        buoyancy = c.whole[5] * length_at(line, NEW, j)
         if j > 1:
             line.rows[RESIDUAL, j - 1, 3] -= buoyancy * near
         else:
@@ -86,7 +81,7 @@ def _water_per_share(line: Line, c: FloatingCableNumbers, w: Weights, j: int, ou
     size = sqrt(max(size, 1e-30))
     along /= size
     side = sqrt(max(square - along * along, 0.0))
-    length, stretch = _length(line, NEW, j), sqrt(1.0 + c.compliance * line.tension[NEW, j])
+    length, stretch = length_at(line, NEW, j), sqrt(1.0 + c.compliance * line.tension[NEW, j])
     across = w.a0 * (c.whole[1] + c.whole[2]) + stretch * c.whole[4] * side
     on_axis = w.a0 * c.whole[2] + stretch * c.whole[3] * abs(along)
     for i in range(3):
@@ -107,7 +102,7 @@ def _dry_energy(line: Line, c: FloatingCableNumbers) -> float:
         find_whole(line, c, j)
         r = c.softness * 0.5 * c.whole[6]
         a, b = depth_in_radii(line, c, NOW, j - 1), depth_in_radii(line, c, NOW, j)
-        total += c.whole[5] * _length(line, NOW, j) * r * dry_energy(a, b)
+        total += c.whole[5] * length_at(line, NOW, j) * r * dry_energy(a, b)
     return total
 
 
@@ -135,7 +130,7 @@ def _wetted_power(line: Line, c: FloatingCableNumbers) -> float:
             square, along, size = square + U * U, along + d * U, size + d * d
         along = along * along / max(size, 1e-30)
         inertia = c.whole[1] * (square - along) + c.whole[2] * square
-        power -= 0.5 * change * inertia * _length(line, NOW, j) / line.ends.previous_step
+        power -= 0.5 * change * inertia * length_at(line, NOW, j) / line.ends.previous_step
     return power
 
 

@@ -46,9 +46,9 @@ def glider(p, u, t):
 
 def model(*, second=True, trusted=False):
     """Return the model. Noise is what a path that is smooth within half a minute leaves of each gauge."""
-    channels = {"gauge": sd.Sensor(noise=0.3, unit="dbar", logger="glider")}
+    channels = {"gauge": sd.Sensor(noise=0.3, zero=1.0, unit="dbar", logger="glider")}
     if second:
-        channels["ad2cp"] = sd.Sensor(noise=0.5, unit="dbar", trusted=trusted, logger="ad2cp")
+        channels["ad2cp"] = sd.Sensor(noise=0.5, zero=1.0, unit="dbar", trusted=trusted, logger="ad2cp")
     return sd.Model(
         glider,
         channels,

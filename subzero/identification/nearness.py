@@ -19,9 +19,8 @@ from subzero.identification.explanation import kinds_of
 from subzero.identification.fit import Fit
 from subzero.identification.problem import Problem
 
-NEAR_LEFT = 1.5
-"""Largest ratio of the residual, after the unknown inputs, to the most that a sensor errs: √2 where its white and its
-slow part are both at their ends, and the scatter of a mean square. [-]"""
+NEAR_LEFT = 1.4
+"""Largest ratio of the residual, after the unknown inputs, to the most that a sensor errs. [-]"""
 NEAR_SIZE = 3.0
 """Largest ratio of an unknown input's size to the declared one. [-]"""
 NEAR_BEND = 4.0

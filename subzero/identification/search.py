@@ -124,13 +124,14 @@ class Search:
                 self._fit(with_term(smaller.terms, twin), base.linear)
 
     def _fit_additions(self, base: Linear) -> None:
-        """Fit the best explanations with one term more, down to those ranked far below the best that was fitted: far
-        from its point a linear problem may promise much that no simulation holds.
+        """Fit the best explanations with one term more, except those that are ranked far below the best of all fits.
+
+        Ranks are not compared with one another: far from its point, a linear problem may be much too favourable.
         """
-        least = self._linear_score(base) - WORTH
+        here = self._linear_score(base)
         for score, linear in self._best_additions(base)[:FITTED]:
-            if score > least:
-                least = max(least, self.score(self._fit(linear.terms, linear, score)) - WITHIN)
+            if score > max(here, self.score(self.ranked()[0]) - WITHIN) - WORTH:
+                self._fit(linear.terms, linear, score)
 
     def _twins(self, term: Term) -> Iterator[Term]:
         """Yield the same error, undone, of other channels of its unit: two gauges differ, and either may be wrong."""
