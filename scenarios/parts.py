@@ -18,7 +18,6 @@ The quotes may be left out. The section [tolerances] gives tolerances of such va
 from __future__ import annotations
 
 import math
-import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -29,6 +28,7 @@ from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source, read_toml, shipped, shipped_path
 from scenarios.similar_vehicle import BASE, complete
 from scenarios.similar_vehicle import SECTION as KNOWN
+from scenarios.vehicle_lists import optional_leaves, value_left_out
 from subzero.errors import short as shown
 
 PATTERNS = {"vehicle": ("vehicles", "subzero2"), "cable": ("cables", "table1")}
@@ -50,24 +50,6 @@ OPTIONAL = {
     **{f"{servo}.{key}": 0.0 for servo in SERVOS for key in ("position_feedback", "lost_command")},
 }
 """Keys of the pattern that a file need not have → the value that is taken then."""
-
-THRUSTER = {
-    **dict.fromkeys(("x", "y", "z"), "m"),
-    **dict.fromkeys(("direction_x", "direction_y", "direction_z"), "1"),
-    **dict.fromkeys(("thrust_ahead", "thrust_astern"), "N"),
-    "curve_exponent": "1",
-    "dead_band": "1",
-    "loss_per_inflow": "kg/s",
-    "reaction_arm": "m",
-    "lag": "s",
-    "lost_command": "1",
-}
-"""Numbers of a thruster, [thrusters.name], and their units; `vehicle.thrusters` has their meaning."""
-OPTIONAL_OF_THRUSTER = {"curve_exponent": 2.0, "dead_band": 0.0, "loss_per_inflow": 0.0, "reaction_arm": 0.0}
-OPTIONAL_OF_THRUSTER |= {"lag": 0.1, "lost_command": 0.0}
-THRUSTER_KEY = re.compile(r"thrusters\.[^.]+\.")
-DERIVATIVE = re.compile(r"derivatives\.[XYZKMN]_(?P<speed>[uvwpqr])(dot|\|?(?P=speed)\|?)?")
-"""``derivatives.X_u``, ``X_uu`` or ``X_u|u|``, ``X_udot``."""
 
 ABOVE_ZERO = ("mass", "density", "diameter", "radius", "area", "inertia")
 """Where the pattern gives no limits, a number whose name ends in one of these must be above zero."""
@@ -162,7 +144,7 @@ def _checked(source: Source, model: Source) -> tuple[dict[str, float], list[Prob
     """Return the values of a file, held against its pattern."""
     wanted, given = dict(leaves(model.table)), dict(leaves(source.table))
     if model is pattern("vehicle"):
-        wanted |= listed(given)
+        wanted |= optional_leaves(given)
     problems = [
         source.problem(key, "this file has no such key", nearest_or_all(key, wanted))
         for key in given
@@ -172,12 +154,8 @@ def _checked(source: Source, model: Source) -> tuple[dict[str, float], list[Prob
     for key, leaf in wanted.items():
         if key not in given and key in OPTIONAL:
             values[key] = OPTIONAL[key]
-        elif (
-            key not in given
-            and key.rpartition(".")[2] in OPTIONAL_OF_THRUSTER
-            and key.startswith("thrusters.")
-        ):
-            values[key] = OPTIONAL_OF_THRUSTER[key.rpartition(".")[2]]
+        elif key not in given and (default := value_left_out(key)) is not None:
+            values[key] = default
         elif key not in given:
             missing.append(
                 source.problem(
@@ -204,32 +182,9 @@ def _incomplete(source: Source, model: Source, missing: list[Problem]) -> Proble
     return replace(missing[0], line=None, key="", why=why, remedy=remedy)
 
 
-def listed(given: Mapping[str, Leaf]) -> Leaves:
-    """Return the pattern of the lists that a vehicle may have: its derivatives, and its thrusters.
-
-    Args:
-        given: dotted key → inline table of a file.
-    """
-    names = dict.fromkeys(key.split(".")[1] for key in given if THRUSTER_KEY.match(key))
-    thrusters: Leaves = {
-        f"thrusters.{name}.{key}": {"unit": unit} for name in names for key, unit in THRUSTER.items()
-    }
-    derivatives: Leaves = {key: {"unit": derivative_unit(key)} for key in given if DERIVATIVE.fullmatch(key)}
-    return thrusters | derivatives
-
-
 def unit_of(kind: str, key: str) -> str:
     """Return the unit of a number that a file of a kind may leave out."""
-    return str((dict(leaves(pattern(kind).table)) | listed({key: {}}))[key]["unit"])
-
-
-def derivative_unit(key: str) -> str:
-    """Return the unit of a derivative such as ``derivatives.K_pp``: force per speed, per speed squared, or per rate."""
-    force, _, speed = key.rpartition(".")[2].partition("_")
-    kind = 0 if speed.endswith("dot") else 2 if len(speed) > 1 else 1
-    metres = (force in "KMN") + (speed[0] in "pqr") * (2 if kind == 2 else 1) - (kind == 2)
-    length = {-1: "/m", 0: "", 1: " m", 2: " m2"}[metres]
-    return f"kg{length}/s" if kind == 1 else f"kg{length}"
+    return str((dict(leaves(pattern(kind).table)) | optional_leaves({key: {}}))[key]["unit"])
 
 
 def leaves(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Leaf]]:
@@ -328,7 +283,7 @@ def _numbers_by_key(
     raw = source.table.get(section, {})
     given = dict(_flat(raw)) if isinstance(raw, Mapping) else {}
     allowed = changeable() if given else {}
-    allowed |= {f"vehicle.{key}": leaf for key, leaf in listed(_of_vehicle(given)).items()}
+    allowed |= {f"vehicle.{key}": leaf for key, leaf in optional_leaves(_of_vehicle(given)).items()}
     found: dict[str, float] = {}
     problems = []
     for key, value in given.items():

@@ -20,18 +20,32 @@ from vehicle.actuators import Servo, Servos
 from vehicle.added_mass import AddedMass
 from vehicle.axial_drag import AxialDrag
 from vehicle.body_lift import BodyLift
+from vehicle.buoyancy_engine import BuoyancyEngine, EngineNumbers
+from vehicle.channels import Channel
 from vehicle.cross_flow import CrossFlowDrag
 from vehicle.damping import LinearDamping, QuadraticDamping
-from vehicle.derivatives import NO_DERIVATIVES, Derivatives, derivatives_of, is_table
+from vehicle.derivatives import NO_DERIVATIVES, Derivatives
+from vehicle.fin_list import Fin, ListedFinNumbers
 from vehicle.fins import FinNumbers, Fins
+from vehicle.flow_axes import NO_FLOW_AXES, FlowAxes
 from vehicle.geometry import Hull, TowPoint
+from vehicle.lists import (
+    DERIVATIVES,
+    FLOW_AXES,
+    LISTS,
+    channels_of,
+    list_problems,
+    listed_numbers,
+    read_optional,
+)
 from vehicle.motor import Battery, Motor, MotorNumbers, motor_numbers
+from vehicle.moving_mass import MovingMass, MovingMassNumbers
 from vehicle.parameters import Problem, Section, VehicleError, nearest, parameter, read_section
 from vehicle.propeller import Propeller, PropellerNumbers
 from vehicle.restoring import Buoyancy, RestoringNumbers
 from vehicle.rigid_body import RigidBody
 from vehicle.state import STATE_SIZE
-from vehicle.thrusters import MOST_THRUSTERS, Thruster, table_of
+from vehicle.thrusters import Thruster, table_of
 
 
 class VehicleNumbers(Record):
@@ -58,6 +72,16 @@ class VehicleNumbers(Record):
     quadratic_table: np.ndarray
     thrusters: np.ndarray
     thruster_count: int
+    channels: np.ndarray
+    channel_count: int
+    fins: tuple[ListedFinNumbers, ...]
+    fin_count: int
+    engines: tuple[EngineNumbers, ...]
+    engine_count: int
+    masses: tuple[MovingMassNumbers, ...]
+    mass_count: int
+    winged: bool
+    flow_axes: np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +98,11 @@ class Vehicle:
 
     Attributes:
         derivatives: further damping and added mass, as a table; none for most.
-        thrusters: by name; none for a vehicle of one propeller and fins.
+        flow_axes: forces in flow axes, of a glider; none for most.
+        thrusters: by name, as all lists; none for a vehicle of one propeller, rudder and stern-planes.
+        fins: further fins, such as a tail in X.
+        moving_masses: such as a battery that slides and turns.
+        buoyancy_engines: such as an oil bladder.
     """
 
     water: Water
@@ -97,7 +125,11 @@ class Vehicle:
     stern_plane_starboard_servo: Servo
     tow_point: TowPoint
     derivatives: Derivatives = NO_DERIVATIVES
+    flow_axes: FlowAxes = NO_FLOW_AXES
     thrusters: tuple[tuple[str, Thruster], ...] = ()
+    fins: tuple[tuple[str, Fin], ...] = ()
+    moving_masses: tuple[tuple[str, MovingMass], ...] = ()
+    buoyancy_engines: tuple[tuple[str, BuoyancyEngine], ...] = ()
 
     def __post_init__(self) -> None:
         """Raise VehicleError for parts that are not valid, or do not fit."""
@@ -105,11 +137,11 @@ class Vehicle:
             Problem(
                 key=name, found=short(getattr(self, name)), why="this is no such part", allowed=kind.__name__
             )
-            for name, kind in {**SECTIONS, DERIVATIVES: Derivatives}.items()
+            for name, kind in {**SECTIONS, FLOW_AXES: FlowAxes, DERIVATIVES: Derivatives}.items()
             if not isinstance(getattr(self, name), kind)
         ]
         problems = problems or inconsistencies(self.hull, self.added_mass, self.derivatives)
-        problems += _thruster_problems(self.thrusters)
+        problems += list_problems(self)
         if problems:
             raise VehicleError(tuple(problems))
 
@@ -119,9 +151,14 @@ class Vehicle:
         return tuple(thruster for _, thruster in self.thrusters)
 
     @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The commands of its listed actuators, in the order of commands and states behind those of `vehicle.STATE`."""
+        return channels_of(self)
+
+    @property
     def state_size(self) -> int:
-        """Entries of its state: those of `vehicle.STATE`, and the lagged command of each thruster."""
-        return STATE_SIZE + len(self.thrusters)
+        """Entries of its state: those of `vehicle.STATE`, and one for each channel."""
+        return STATE_SIZE + len(self.channels)
 
     def numbers(self) -> VehicleNumbers:
         """Return the numbers of the compiled equations, a copy that may be changed.
@@ -173,6 +210,9 @@ class Vehicle:
             quadratic_table=self.derivatives.quadratic,
             thrusters=table_of(self.thruster_list),
             thruster_count=len(self.thrusters),
+            winged=self.flow_axes != NO_FLOW_AXES,
+            flow_axes=self.flow_axes.numbers(),
+            **listed_numbers(self),
         )
 
     def with_parameter(self, key: str, value: float) -> Vehicle:
@@ -234,8 +274,6 @@ SECTIONS: dict[str, type] = {
     "tow_point": TowPoint,
 }
 """Every section of a vehicle and the dataclass that reads it."""
-DERIVATIVES, THRUSTERS = "derivatives", "thrusters"
-"""Sections that a vehicle need not have, and that are lists: derivatives by name, and a table for each thruster."""
 
 
 def to_mapping(vehicle: Vehicle) -> dict[str, dict[str, Any]]:
@@ -243,8 +281,11 @@ def to_mapping(vehicle: Vehicle) -> dict[str, dict[str, Any]]:
     mapping = {section: getattr(vehicle, section).by_name() for section in SECTIONS}
     if vehicle.derivatives:
         mapping[DERIVATIVES] = dict(vehicle.derivatives.table)
-    if vehicle.thrusters:
-        mapping[THRUSTERS] = {name: thruster.by_name() for name, thruster in vehicle.thrusters}
+    if vehicle.flow_axes != NO_FLOW_AXES:
+        mapping[FLOW_AXES] = vehicle.flow_axes.by_name()
+    for section in LISTS:
+        if rows := getattr(vehicle, section):
+            mapping[section] = {name: part.by_name() for name, part in rows}
     return mapping
 
 
@@ -257,12 +298,15 @@ def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
     """
     problems = [
         Problem(
-            key=str(name), found="this table", why="no such section", allowed=nearest(name, list(SECTIONS))
+            key=str(name),
+            found="this table",
+            why="no such section",
+            allowed=nearest(name, [*SECTIONS, *LISTS, DERIVATIVES, FLOW_AXES]),
         )
         for name in mapping
-        if name not in SECTIONS and name not in (DERIVATIVES, THRUSTERS)
+        if name not in (*SECTIONS, *LISTS, DERIVATIVES, FLOW_AXES)
     ]
-    sections: dict[str, Any] = _lists(mapping, problems)
+    sections: dict[str, Any] = read_optional(mapping, problems)
     for name, kind in SECTIONS.items():
         if name in mapping:
             sections[name] = read_section(kind, name, mapping[name], problems)
@@ -273,48 +317,6 @@ def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
     if problems:
         raise VehicleError(tuple(problems))
     return Vehicle(**sections)
-
-
-def _lists(mapping: Mapping[str, object], problems: list[Problem]) -> dict[str, Any]:
-    """Return the derivatives and the thrusters of a mapping; note their problems."""
-    found: dict[str, Any] = {}
-    derivatives, thrusters = (mapping.get(name, {}) for name in (DERIVATIVES, THRUSTERS))
-    for name, table in ((DERIVATIVES, derivatives), (THRUSTERS, thrusters)):
-        if not isinstance(table, Mapping):
-            allowed = "a table of tables, [thrusters.name]" if name == THRUSTERS else "a table of numbers"
-            problems.append(Problem(key=name, found=short(table), why="a table is needed", allowed=allowed))
-            return {}
-    try:
-        found[DERIVATIVES] = derivatives_of(derivatives)  # type: ignore[arg-type]
-    except VehicleError as error:
-        problems.extend(error.problems)
-    rows = [
-        (str(name), read_section(Thruster, f"{THRUSTERS}.{name}", values, problems))
-        for name, values in thrusters.items()  # type: ignore[attr-defined]
-    ]
-    return found | {THRUSTERS: tuple(rows)}
-
-
-def _thruster_problems(thrusters: tuple[tuple[str, Thruster], ...]) -> list[Problem]:
-    """Return the problems of a list of thrusters that are valid by themselves."""
-    if not is_table(thrusters) or not all(isinstance(each, Thruster) for _, each in thrusters):
-        why, allowed = "this is no such part", "pairs of a name and a vehicle.thrusters.Thruster"
-        return [Problem(key=THRUSTERS, found=short(thrusters), why=why, allowed=allowed)]
-    problems = [
-        Problem(
-            key=f"{THRUSTERS}.{name}.direction_x",
-            found="a direction of length 0",
-            why="it pushes nowhere",
-            allowed="a vector of the body's axes; its length does not matter",
-        )
-        for name, thruster in thrusters
-        if not thruster.direction.any()
-    ]
-    if len(thrusters) > MOST_THRUSTERS:
-        why = "so many have no room"
-        allowed = f"up to {MOST_THRUSTERS}"
-        problems.append(Problem(key=THRUSTERS, found=f"{len(thrusters)} thrusters", why=why, allowed=allowed))
-    return problems
 
 
 def inconsistencies(
