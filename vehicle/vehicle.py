@@ -151,6 +151,16 @@ class Vehicle:
         return tuple(thruster for _, thruster in self.thrusters)
 
     @property
+    def has_rudder(self) -> bool:
+        """Whether a fin answers the rudder's command."""
+        return self.rudder.area > 0.0 or any(fin.rudder_share and fin.area for _, fin in self.fins)
+
+    @property
+    def has_stern_planes(self) -> bool:
+        """Whether a fin answers the commands of the stern-planes."""
+        return self.stern_planes.area > 0.0 or any(fin.plane_share and fin.area for _, fin in self.fins)
+
+    @property
     def channels(self) -> tuple[Channel, ...]:
         """The commands of its listed actuators, in the order of commands and states behind those of `vehicle.STATE`."""
         return channels_of(self)
