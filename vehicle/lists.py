@@ -31,7 +31,7 @@ LISTS: dict[str, tuple[type, int]] = {
     "moving_masses": (MovingMass, MOST_MASSES),
     "buoyancy_engines": (BuoyancyEngine, MOST_ENGINES),
 }
-"""Lists of actuators that a vehicle may have: a table for each by its name; what each is, and how many there may be."""
+"""Lists of actuators that a vehicle may have: a table for each by its name; its kind, and how many there may be."""
 FIXED_COMMANDS = ("propeller", "rudder", "stern_plane", "stern_plane_port", "stern_plane_starboard")
 """Names that commands of listed actuators cannot have."""
 
