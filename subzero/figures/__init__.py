@@ -15,7 +15,7 @@ from subzero.arguments import check_is_run, checked_arguments
 from subzero.errors import BadValueError
 from subzero.figures.cable import deployment, is_deployed, shape, tension
 from subzero.figures.forces import forces
-from subzero.figures.motion import attitude, figure_6, measured, station
+from subzero.figures.motion import actuators, attitude, figure_6, measured, station
 from subzero.figures.prescribed import exact_tension, figure_4, figure_5, is_straight
 from subzero.figures.style import Runs, Title, page_width, warnings_in_short
 
@@ -76,6 +76,8 @@ def _commanded(runs: Runs, record: Record | None, title: Title) -> dict[str, Fig
         figures = {"station": station(runs, record, title)}
     else:
         figures = {"fig6": figure_6(runs, record, title), "attitude": attitude(runs, record, title)}
+    if drawn := actuators(runs, title):
+        figures["actuators"] = drawn
     if "tethered" in runs:
         figures |= _cable(runs["tethered"], title)
     figures["forces"] = forces(runs.get("tethered", next(iter(runs.values()))), title)

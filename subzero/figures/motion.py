@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from subzero.channels import BY_NAME
+from subzero.channels import BY_NAME, LISTED
 from subzero.figures import style
 from subzero.figures.style import (
     Runs,
@@ -103,6 +103,28 @@ def station(runs: Runs, record: Record | None, title: Title) -> Figure:
     legend(panels[5], columns=2)
     legend(panels[0])
     time_label(panels, 2)
+    return figure
+
+
+def actuators(runs: Runs, title: Title) -> Figure | None:
+    """Draw fins, moving masses and buoyancy engines of a list, a panel each, of one run; None for a vehicle without."""
+    which, run = next(iter(runs.items()))
+    thrusters = set(run["thruster"].values.tolist()) if "thruster" in run.coords else set()
+    names = {str(each.attrs[LISTED]): None for each in run.variables.values() if LISTED in each.attrs}
+    shown = [name for name in names if name not in thrusters]
+    if not shown:
+        return None
+    figure, panels = sheet((len(shown) + 1) // 2, 2, title)
+    for axes, name in zip(panels, shown, strict=False):
+        channel_panel(axes, {which: run}, f"{name}_state")
+        axes.step(
+            run["time"].values, run[f"{name}_command"].values, where="post", label="commanded", **style.COMMAND
+        )
+        headline(axes, name.replace("_", " ").capitalize())
+    for axes in panels[len(shown) :]:
+        axes.remove()
+    legend(panels[0])
+    time_label(panels[: len(shown)], 2)
     return figure
 
 

@@ -31,6 +31,7 @@ FIGURES = {
     "fig6": "Propeller command, forward speed, rudder and heading over time",
     "attitude": "Actuators and attitude over time",
     "station": "Place, heading and thrusters over time",
+    "actuators": "Fins, moving masses and buoyancy engines of the vehicle's lists, commanded and moved",
     "cable": "Shape of the cable, and tension along it",
     "tension": "Tension along the cable over time, and between which values it has been",
     "forces": "Forces on the vehicle, and where the energy went",
