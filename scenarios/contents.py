@@ -121,7 +121,7 @@ def locate(name_or_path: str | Path) -> tuple[str, Source]:
 def _kind_of(source: Source) -> str:
     """Return the kind of a user's file, by the sections that only this kind has."""
     table = source.table
-    if {"base", "known", "derivatives", "thrusters", "rigid_body"} & table.keys():
+    if {"base", "known", "derivatives", "thrusters", "sections", "rigid_body"} & table.keys():
         return "vehicle"
     for kind, key, shape in (("vehicle", "hull", dict), ("cable", "drum", dict), ("trial", "vehicle", str)):
         if isinstance(table.get(key), shape):

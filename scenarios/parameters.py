@@ -25,6 +25,8 @@ import numpy as np
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source
 from scenarios.parts import (
+    FURTHER,
+    LISTS,
     PATTERNS,
     Leaf,
     Part,
@@ -257,7 +259,7 @@ def _pattern_rows() -> dict[str, Leaf]:
 
 def _part_rows(trial: Trial) -> dict[str, Leaf]:
     """Return the numbers of the parts of a trial: of every vehicle and cable, its derivatives and thrusters."""
-    lists = {name: trial.vehicle[name] for name in ("derivatives", "thrusters") if name in trial.vehicle}
+    lists = {name: trial.vehicle[name] for name in ("derivatives", *LISTS, *FURTHER) if name in trial.vehicle}
     if not lists:
         return _pattern_rows()
     own = listed(dict(leaves(lists)))

@@ -29,6 +29,8 @@ from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source, read_toml, shipped, shipped_path
 from scenarios.similar_vehicle import BASE, complete
 from scenarios.similar_vehicle import SECTION as KNOWN
+from subzero.derivative_names import COMPLETE, FIN_NAMES, RACE, complaint
+from subzero.derivative_names import parsed as parsed_name
 from subzero.errors import short as shown
 
 PATTERNS = {"vehicle": ("vehicles", "subzero2"), "cable": ("cables", "table1")}
@@ -65,9 +67,19 @@ THRUSTER = {
 """Numbers of a thruster, [thrusters.name], and their units; `vehicle.thrusters` has their meaning."""
 OPTIONAL_OF_THRUSTER = {"curve_exponent": 2.0, "dead_band": 0.0, "loss_per_inflow": 0.0, "reaction_arm": 0.0}
 OPTIONAL_OF_THRUSTER |= {"lag": 0.1, "lost_command": 0.0}
-THRUSTER_KEY = re.compile(r"thrusters\.[^.]+\.")
-DERIVATIVE = re.compile(r"derivatives\.[XYZKMN]_(?P<speed>[uvwpqr])(dot|\|?(?P=speed)\|?)?")
-"""``derivatives.X_u``, ``X_uu`` or ``X_u|u|``, ``X_udot``."""
+HULL_SECTION = dict.fromkeys(("x", "breadth", "height"), "m")
+HULL_SECTION |= dict.fromkeys(("lateral_drag_coefficient", "vertical_drag_coefficient"), "1")
+"""Numbers of a section of a hull that is no body of revolution, [sections.name]; see `vehicle.box_sections`."""
+LISTS = {"thrusters": THRUSTER, "sections": HULL_SECTION}
+"""Lists of tables that a vehicle may have → the numbers of each table, and their units."""
+FURTHER = {
+    "products_of_inertia": dict.fromkeys(("xy", "xz", "yz"), "kg m2"),
+    "race": {"advance": "m", "thrust_loading": "1"},
+}
+"""Sections that a vehicle may have → their numbers and units."""
+DERIVATIVES = "derivatives."
+FACTOR_NAMES = (*FIN_NAMES, RACE)
+"""Names that may be factors of a derivative."""
 
 ABOVE_ZERO = ("mass", "density", "diameter", "radius", "area", "inertia")
 """Where the pattern gives no limits, a number whose name ends in one of these must be above zero."""
@@ -129,6 +141,8 @@ def read_part(source: Source, kind: str, named: str) -> tuple[Part, list[Problem
 @lru_cache(maxsize=4)
 def part_of(part: Source, kind: str) -> tuple[Part, list[Problem]]:
     """Return the vehicle or the cable of a file, one of the last few that were read, and its problems."""
+    if kind == "vehicle":
+        part = _with_primes(part)
     if kind == "vehicle" and BASE in part.table:
         part = _completed(part)
     values, problems = _checked(part, pattern(kind))
@@ -163,11 +177,7 @@ def _checked(source: Source, model: Source) -> tuple[dict[str, float], list[Prob
     wanted, given = dict(leaves(model.table)), dict(leaves(source.table))
     if model is pattern("vehicle"):
         wanted |= listed(given)
-    problems = [
-        source.problem(key, "this file has no such key", nearest_or_all(key, wanted))
-        for key in given
-        if key not in wanted
-    ]
+    problems = [source.problem(key, *_no_such_key(key, wanted)) for key in given if key not in wanted]
     values, missing = {}, []
     for key, leaf in wanted.items():
         if key not in given and key in OPTIONAL:
@@ -205,17 +215,22 @@ def _incomplete(source: Source, model: Source, missing: list[Problem]) -> Proble
 
 
 def listed(given: Mapping[str, Leaf]) -> Leaves:
-    """Return the pattern of the lists that a vehicle may have: its derivatives, and its thrusters.
+    """Return the pattern of what a vehicle may have besides: derivatives, lists such as thrusters, further sections.
 
     Args:
         given: dotted key → inline table of a file.
     """
-    names = dict.fromkeys(key.split(".")[1] for key in given if THRUSTER_KEY.match(key))
-    thrusters: Leaves = {
-        f"thrusters.{name}.{key}": {"unit": unit} for name in names for key, unit in THRUSTER.items()
-    }
-    derivatives: Leaves = {key: {"unit": derivative_unit(key)} for key in given if DERIVATIVE.fullmatch(key)}
-    return thrusters | derivatives
+    found: Leaves = {}
+    for section, units in LISTS.items():
+        names = dict.fromkeys(key.split(".")[1] for key in given if re.match(rf"{section}\.[^.]+\.", key))
+        found |= {f"{section}.{name}.{key}": {"unit": unit} for name in names for key, unit in units.items()}
+    for section, units in FURTHER.items():
+        if any(key.startswith(f"{section}.") for key in given):
+            found |= {f"{section}.{key}": {"unit": unit} for key, unit in units.items()}
+    for key in given:
+        if key.startswith(DERIVATIVES) and (unit := derivative_unit(key)):
+            found[key] = {"unit": unit}
+    return found
 
 
 def unit_of(kind: str, key: str) -> str:
@@ -223,13 +238,45 @@ def unit_of(kind: str, key: str) -> str:
     return str((dict(leaves(pattern(kind).table)) | listed({key: {}}))[key]["unit"])
 
 
-def derivative_unit(key: str) -> str:
-    """Return the unit of a derivative such as ``derivatives.K_pp``: force per speed, per speed squared, or per rate."""
-    force, _, speed = key.rpartition(".")[2].partition("_")
-    kind = 0 if speed.endswith("dot") else 2 if len(speed) > 1 else 1
-    metres = (force in "KMN") + (speed[0] in "pqr") * (2 if kind == 2 else 1) - (kind == 2)
-    length = {-1: "/m", 0: "", 1: " m", 2: " m2"}[metres]
-    return f"kg{length}/s" if kind == 1 else f"kg{length}"
+def derivative_unit(key: str) -> str | None:
+    """Return the unit of a derivative such as ``derivatives.K_pp``; None if it is none."""
+    name = key.removeprefix(DERIVATIVES)
+    if name == COMPLETE:
+        return "1"
+    found = parsed_name(name, FACTOR_NAMES)
+    return found.unit if found else None
+
+
+def _no_such_key(key: str, allowed: Mapping[str, Leaf]) -> tuple[str, str]:
+    """Return why a key cannot be, and the remedy."""
+    if key.startswith(DERIVATIVES) and (said := complaint(key.removeprefix(DERIVATIVES), FACTOR_NAMES)):
+        return said[0], f"Allowed: {said[1]}."
+    return "this file has no such key", nearest_or_all(key, allowed)
+
+
+def _with_primes(source: Source) -> Source:
+    """Return a vehicle file with a prime at the names of the derivatives without dimensions, those of unit "1"."""
+    given = source.table.get(DERIVATIVES[:-1])
+    if not isinstance(given, Mapping):
+        return source
+    names = {
+        name: f"{name}'"
+        for name, leaf in given.items()
+        if isinstance(leaf, Mapping)
+        and leaf.get("unit") == "1"
+        and not name.endswith("'")
+        and name != COMPLETE
+    }
+    if not names:
+        return source
+    primed = {names.get(name, name): leaf for name, leaf in given.items()}
+    lines = {
+        f"{DERIVATIVES}{new}": source.lines[f"{DERIVATIVES}{name}"]
+        for name, new in names.items()
+        if f"{DERIVATIVES}{name}" in source.lines
+    }
+    table = source.table | {DERIVATIVES[:-1]: primed}
+    return replace(source, table=table, lines=source.lines | lines)
 
 
 def leaves(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Leaf]]:
@@ -334,8 +381,10 @@ def _numbers_by_key(
     for key, value in given.items():
         place = f"{section}.{key}"
         if key not in allowed:
-            why = "no vehicle and no cable has such a value"
-            problems.append(source.problem(place, why, _nearest(key, allowed)))
+            why, remedy = "no vehicle and no cable has such a value", _nearest(key, allowed)
+            if key.startswith(f"vehicle.{DERIVATIVES}"):
+                why, remedy = _no_such_key(key.removeprefix("vehicle."), allowed)
+            problems.append(source.problem(place, why, remedy))
         elif complaint := complaint_of(value, allowed[key], key):
             problems.append(source.problem(place, *complaint, found=value))
         else:

@@ -393,8 +393,8 @@ def _drag(number: Any, speed: float) -> float:
         number(f"{fin}.area") * number(f"{fin}.profile_drag_coefficient")
         for fin in ("rudder", "stern_planes")
     )
-    linear, square = (number(f"derivatives.X_{name}") for name in ("u", "uu"))
-    hull += rho * fins - square
+    linear, square, primed = (number(f"derivatives.X_{name}") for name in ("u", "uu", "uu'"))
+    hull += rho * fins - square - 0.5 * rho * number("hull.length") ** 2 * primed
     return float(hull * speed**2 - (linear + number("linear_damping.surge")) * speed)
 
 

@@ -22,10 +22,12 @@ from subzero.jit import inlined
 from vehicle.added_mass import munk_correction
 from vehicle.axial_drag import axial_drag
 from vehicle.body_lift import body_lift
+from vehicle.box_sections import add_section_drag
 from vehicle.cross_flow import cross_flow_drag
 from vehicle.damping import linear_damping, quadratic_damping
 from vehicle.derivatives import add_damping
 from vehicle.fins import rudder, stern_plane
+from vehicle.products import add_products
 from vehicle.propeller import propeller
 from vehicle.restoring import restoring
 from vehicle.rigid_body import coriolis
@@ -111,6 +113,8 @@ def fill_terms(
     turning_current(nu, nu_r, numbers.mass_matrix, out[3])
     body_lift(nu_r, numbers.body_lift, out[4])
     cross_flow_drag(nu_r, numbers.strips, out[5])
+    if numbers.has_sections:
+        add_section_drag(nu_r, numbers.section_strips, out[5])
     axial_drag(nu_r, numbers.axial_drag, out[6])
     linear_damping(nu_r, numbers.linear_damping, out[7])
     quadratic_damping(nu_r, numbers.quadratic_damping, out[8])
@@ -123,5 +127,7 @@ def fill_terms(
     rudder(nu_r, angles[0], numbers.rudder, out[11])
     stern_plane(nu_r, angles[1], -1.0, numbers.stern_planes, out[12])
     stern_plane(nu_r, angles[2], 1.0, numbers.stern_planes, out[13])
+    if numbers.product_count > 0:
+        add_products(nu_r, n, angles, numbers.race, numbers.products, numbers.product_count, out)
     for i in range(6):
         out[14, i] = wrench_b[i]

@@ -20,6 +20,7 @@ from vehicle.actuators import Servo, Servos
 from vehicle.added_mass import AddedMass
 from vehicle.axial_drag import AxialDrag
 from vehicle.body_lift import BodyLift
+from vehicle.box_sections import HullSection, section_problems, strips_of
 from vehicle.cross_flow import CrossFlowDrag
 from vehicle.damping import LinearDamping, QuadraticDamping
 from vehicle.derivatives import NO_DERIVATIVES, Derivatives, derivatives_of, is_table
@@ -27,10 +28,13 @@ from vehicle.fins import FinNumbers, Fins
 from vehicle.geometry import Hull, TowPoint
 from vehicle.motor import Battery, Motor, MotorNumbers, motor_numbers
 from vehicle.parameters import Problem, Section, VehicleError, nearest, parameter, read_section
+from vehicle.products import NO_RACE, Race, RaceNumbers, count_of, product_problems
+from vehicle.products import table_of as product_table_of
 from vehicle.propeller import Propeller, PropellerNumbers
 from vehicle.restoring import Buoyancy, RestoringNumbers
-from vehicle.rigid_body import RigidBody
+from vehicle.rigid_body import ProductsOfInertia, RigidBody, inertia_problems
 from vehicle.state import STATE_SIZE
+from vehicle.terms import BREAKDOWN
 from vehicle.thrusters import MOST_THRUSTERS, Thruster, table_of
 
 
@@ -56,6 +60,11 @@ class VehicleNumbers(Record):
     tabled: bool
     linear_table: np.ndarray
     quadratic_table: np.ndarray
+    products: np.ndarray
+    product_count: int
+    race: RaceNumbers
+    has_sections: bool
+    section_strips: np.ndarray
     thrusters: np.ndarray
     thruster_count: int
 
@@ -75,6 +84,9 @@ class Vehicle:
     Attributes:
         derivatives: further damping and added mass, as a table; none for most.
         thrusters: by name; none for a vehicle of one propeller and fins.
+        sections: by name, of a hull that is no body of revolution, for its cross-flow drag; none for a Myring hull.
+        products_of_inertia: None for none.
+        race: of the propeller, as a factor of derivatives; None where none has it.
     """
 
     water: Water
@@ -98,6 +110,9 @@ class Vehicle:
     tow_point: TowPoint
     derivatives: Derivatives = NO_DERIVATIVES
     thrusters: tuple[tuple[str, Thruster], ...] = ()
+    sections: tuple[tuple[str, HullSection], ...] = ()
+    products_of_inertia: ProductsOfInertia | None = None
+    race: Race | None = None
 
     def __post_init__(self) -> None:
         """Raise VehicleError for parts that are not valid, or do not fit."""
@@ -108,8 +123,13 @@ class Vehicle:
             for name, kind in {**SECTIONS, DERIVATIVES: Derivatives}.items()
             if not isinstance(getattr(self, name), kind)
         ]
-        problems = problems or inconsistencies(self.hull, self.added_mass, self.derivatives)
+        problems = problems or [
+            *inconsistencies(self.hull, self.added_mass, self.derivatives, self.water.density),
+            *product_problems(self.derivatives, self.race),
+            *inertia_problems(self.rigid_body, self.products_of_inertia),
+        ]
         problems += _thruster_problems(self.thrusters)
+        problems += section_problems(self.sections)
         if problems:
             raise VehicleError(tuple(problems))
 
@@ -142,16 +162,19 @@ class Vehicle:
         return _numbers_of(self)  # not kept as an attribute: a copy with other values would take it along
 
     def _numbers(self) -> VehicleNumbers:
-        density = self.water.density
+        density, length = self.water.density, self.hull.length
         rigid_body, added_mass = self.rigid_body.matrix(), self.added_mass.matrix()
+        if self.products_of_inertia:
+            rigid_body = rigid_body + self.products_of_inertia.matrix()
         if self.derivatives:
-            added_mass = added_mass + self.derivatives.added_mass
+            added_mass = added_mass + self.derivatives.added_mass(density, length)
         mass_matrix = rigid_body + added_mass
+        rows = self.derivatives.with_dimensions(density, length)
         return VehicleNumbers(
             mass_matrix=mass_matrix,
             inverse_mass=np.linalg.inv(mass_matrix),
             rigid_body=rigid_body,
-            added_mass=added_mass,
+            added_mass=0.0 * added_mass if self.derivatives.is_complete else added_mass,
             munk_excess=self.added_mass.munk_factor - 1.0,
             body_lift=self.body_lift.numbers(),
             strips=self.cross_flow_drag.numbers(self.hull, density),
@@ -169,8 +192,13 @@ class Vehicle:
             ),
             motor=motor_numbers(self.motor, self.battery),
             tabled=bool(self.derivatives),
-            linear_table=self.derivatives.linear,
-            quadratic_table=self.derivatives.quadratic,
+            linear_table=self.derivatives.linear(density, length),
+            quadratic_table=self.derivatives.quadratic(density, length),
+            products=product_table_of(rows, self.derivatives.named, _PLACES),
+            product_count=count_of(rows),
+            race=self.race.numbers() if self.race else NO_RACE,
+            has_sections=bool(self.sections),
+            section_strips=strips_of(tuple(section for _, section in self.sections), density),
             thrusters=table_of(self.thruster_list),
             thruster_count=len(self.thrusters),
         )
@@ -184,6 +212,9 @@ class Vehicle:
             table = table.setdefault(section, {})
         table[name] = value
         return from_mapping(mapping)
+
+
+_PLACES = {name: i for i, name in enumerate(BREAKDOWN)}
 
 
 @lru_cache(maxsize=4)
@@ -234,8 +265,11 @@ SECTIONS: dict[str, type] = {
     "tow_point": TowPoint,
 }
 """Every section of a vehicle and the dataclass that reads it."""
-DERIVATIVES, THRUSTERS = "derivatives", "thrusters"
-"""Sections that a vehicle need not have, and that are lists: derivatives by name, and a table for each thruster."""
+DERIVATIVES, THRUSTERS, HULL_SECTIONS = "derivatives", "thrusters", "sections"
+LISTS: dict[str, type] = {THRUSTERS: Thruster, HULL_SECTIONS: HullSection}
+"""Sections that a vehicle need not have, and that are lists: derivatives by name, a table for each thruster."""
+FURTHER: dict[str, type] = {"products_of_inertia": ProductsOfInertia, "race": Race}
+"""Sections of numbers that a vehicle need not have."""
 
 
 def to_mapping(vehicle: Vehicle) -> dict[str, dict[str, Any]]:
@@ -243,8 +277,12 @@ def to_mapping(vehicle: Vehicle) -> dict[str, dict[str, Any]]:
     mapping = {section: getattr(vehicle, section).by_name() for section in SECTIONS}
     if vehicle.derivatives:
         mapping[DERIVATIVES] = dict(vehicle.derivatives.table)
-    if vehicle.thrusters:
-        mapping[THRUSTERS] = {name: thruster.by_name() for name, thruster in vehicle.thrusters}
+    for listed in LISTS:
+        if rows := getattr(vehicle, listed):
+            mapping[listed] = {name: row.by_name() for name, row in rows}
+    for section in FURTHER:
+        if found := getattr(vehicle, section):
+            mapping[section] = found.by_name()
     return mapping
 
 
@@ -260,7 +298,7 @@ def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
             key=str(name), found="this table", why="no such section", allowed=nearest(name, list(SECTIONS))
         )
         for name in mapping
-        if name not in SECTIONS and name not in (DERIVATIVES, THRUSTERS)
+        if name not in {*SECTIONS, *LISTS, *FURTHER, DERIVATIVES}
     ]
     sections: dict[str, Any] = _lists(mapping, problems)
     for name, kind in SECTIONS.items():
@@ -276,23 +314,29 @@ def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
 
 
 def _lists(mapping: Mapping[str, object], problems: list[Problem]) -> dict[str, Any]:
-    """Return the derivatives and the thrusters of a mapping; note their problems."""
-    found: dict[str, Any] = {}
-    derivatives, thrusters = (mapping.get(name, {}) for name in (DERIVATIVES, THRUSTERS))
-    for name, table in ((DERIVATIVES, derivatives), (THRUSTERS, thrusters)):
+    """Return what a mapping has besides `SECTIONS`: derivatives, lists, further sections; note their problems."""
+    found: dict[str, Any] = {
+        name: read_section(kind, name, mapping[name], problems)
+        for name, kind in FURTHER.items()
+        if name in mapping
+    }
+    tables = {name: mapping[name] for name in (DERIVATIVES, *LISTS) if name in mapping}
+    for name, table in tables.items():
         if not isinstance(table, Mapping):
-            allowed = "a table of tables, [thrusters.name]" if name == THRUSTERS else "a table of numbers"
+            allowed = "a table of numbers" if name == DERIVATIVES else f"a table of tables, [{name}.name]"
             problems.append(Problem(key=name, found=short(table), why="a table is needed", allowed=allowed))
-            return {}
-    try:
-        found[DERIVATIVES] = derivatives_of(derivatives)  # type: ignore[arg-type]
-    except VehicleError as error:
-        problems.extend(error.problems)
-    rows = [
-        (str(name), read_section(Thruster, f"{THRUSTERS}.{name}", values, problems))
-        for name, values in thrusters.items()  # type: ignore[attr-defined]
-    ]
-    return found | {THRUSTERS: tuple(rows)}
+        elif name == DERIVATIVES:
+            try:
+                found[name] = derivatives_of(table)
+            except VehicleError as error:
+                problems.extend(error.problems)
+        else:
+            kind = LISTS[name]
+            found[name] = tuple(
+                (str(key), read_section(kind, f"{name}.{key}", values, problems))
+                for key, values in table.items()
+            )
+    return found
 
 
 def _thruster_problems(thrusters: tuple[tuple[str, Thruster], ...]) -> list[Problem]:
@@ -318,11 +362,12 @@ def _thruster_problems(thrusters: tuple[tuple[str, Thruster], ...]) -> list[Prob
 
 
 def inconsistencies(
-    hull: Hull, added_mass: AddedMass, derivatives: Derivatives = NO_DERIVATIVES
+    hull: Hull, added_mass: AddedMass, derivatives: Derivatives, density: float
 ) -> list[Problem]:
     """Return the inconsistencies between numbers that are valid by themselves."""
     problems = []
-    if derivatives and np.linalg.eigvalsh(added_mass.matrix() + derivatives.added_mass)[0] < -1e-9:
+    tabled = derivatives.added_mass(density, hull.length) if derivatives else np.zeros((6, 6))
+    if derivatives and np.linalg.eigvalsh(added_mass.matrix() + tabled)[0] < -1e-9:
         why = "the added mass would give negative kinetic energy"
         allowed = "a matrix without negative eigenvalues"
         problems.append(Problem(key=DERIVATIVES, found="its couplings", why=why, allowed=allowed))
