@@ -20,6 +20,7 @@ from scenarios.parameters import parameter_names, parameter_values, quantity_of
 from scenarios.parts import PATTERNS, Part, leaves, part_of, read_changes, read_part, unit_of
 from scenarios.quantities import Quantity
 from scenarios.trial import Trial
+from scenarios.vehicle_lists import OPTIONAL_SECTIONS
 from subzero.errors import printable
 
 SENTENCE_END = re.compile(r"(?<=[\w)]{2})\. (?=[A-Z])")
@@ -121,7 +122,7 @@ def locate(name_or_path: str | Path) -> tuple[str, Source]:
 def _kind_of(source: Source) -> str:
     """Return the kind of a user's file, by the sections that only this kind has."""
     table = source.table
-    if {"base", "known", "derivatives", "thrusters", "sections", "rigid_body"} & table.keys():
+    if {"base", "known", "rigid_body", *OPTIONAL_SECTIONS} & table.keys():
         return "vehicle"
     for kind, key, shape in (("vehicle", "hull", dict), ("cable", "drum", dict), ("trial", "vehicle", str)):
         if isinstance(table.get(key), shape):

@@ -25,14 +25,11 @@ import numpy as np
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source
 from scenarios.parts import (
-    FURTHER,
-    LISTS,
     PATTERNS,
     Leaf,
     Part,
     changeable,
     leaves,
-    listed,
     nested,
     read_changes,
     read_part,
@@ -53,6 +50,7 @@ from scenarios.quantities import (
     by_field,
 )
 from scenarios.trial import SETPOINT, Trial
+from scenarios.vehicle_lists import OPTIONAL_SECTIONS, optional_leaves
 from subzero.errors import real
 from subzero.errors import short as shown
 
@@ -258,11 +256,11 @@ def _pattern_rows() -> dict[str, Leaf]:
 
 
 def _part_rows(trial: Trial) -> dict[str, Leaf]:
-    """Return the numbers of the parts of a trial: of every vehicle and cable, its derivatives and thrusters."""
-    lists = {name: trial.vehicle[name] for name in ("derivatives", *LISTS, *FURTHER) if name in trial.vehicle}
+    """Return the numbers of the parts of a trial: of every vehicle and cable, and the optional sections of its own."""
+    lists = {name: trial.vehicle[name] for name in OPTIONAL_SECTIONS if name in trial.vehicle}
     if not lists:
         return _pattern_rows()
-    own = listed(dict(leaves(lists)))
+    own = optional_leaves(dict(leaves(lists)))
     return _pattern_rows() | {f"vehicle.{key}": leaf for key, leaf in own.items()}
 
 

@@ -18,7 +18,6 @@ The quotes may be left out. The section [tolerances] gives tolerances of such va
 from __future__ import annotations
 
 import math
-import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -29,8 +28,14 @@ from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source, read_toml, shipped, shipped_path
 from scenarios.similar_vehicle import BASE, complete
 from scenarios.similar_vehicle import SECTION as KNOWN
-from subzero.derivative_names import COMPLETE, FIN_NAMES, RACE, complaint
-from subzero.derivative_names import parsed as parsed_name
+from scenarios.vehicle_lists import (
+    DERIVATIVES,
+    factor_names,
+    optional_leaves,
+    primed_names,
+    value_left_out,
+)
+from subzero.derivative_names import complaint
 from subzero.errors import short as shown
 
 PATTERNS = {"vehicle": ("vehicles", "subzero2"), "cable": ("cables", "table1")}
@@ -52,34 +57,6 @@ OPTIONAL = {
     **{f"{servo}.{key}": 0.0 for servo in SERVOS for key in ("position_feedback", "lost_command")},
 }
 """Keys of the pattern that a file need not have → the value that is taken then."""
-
-THRUSTER = {
-    **dict.fromkeys(("x", "y", "z"), "m"),
-    **dict.fromkeys(("direction_x", "direction_y", "direction_z"), "1"),
-    **dict.fromkeys(("thrust_ahead", "thrust_astern"), "N"),
-    "curve_exponent": "1",
-    "dead_band": "1",
-    "loss_per_inflow": "kg/s",
-    "reaction_arm": "m",
-    "lag": "s",
-    "lost_command": "1",
-}
-"""Numbers of a thruster, [thrusters.name], and their units; `vehicle.thrusters` has their meaning."""
-OPTIONAL_OF_THRUSTER = {"curve_exponent": 2.0, "dead_band": 0.0, "loss_per_inflow": 0.0, "reaction_arm": 0.0}
-OPTIONAL_OF_THRUSTER |= {"lag": 0.1, "lost_command": 0.0}
-HULL_SECTION = dict.fromkeys(("x", "breadth", "height"), "m")
-HULL_SECTION |= dict.fromkeys(("lateral_drag_coefficient", "vertical_drag_coefficient"), "1")
-"""Numbers of a section of a hull that is no body of revolution, [sections.name]; see `vehicle.box_sections`."""
-LISTS = {"thrusters": THRUSTER, "sections": HULL_SECTION}
-"""Lists of tables that a vehicle may have → the numbers of each table, and their units."""
-FURTHER = {
-    "products_of_inertia": dict.fromkeys(("xy", "xz", "yz"), "kg m2"),
-    "race": {"advance": "m", "thrust_loading": "1"},
-}
-"""Sections that a vehicle may have → their numbers and units."""
-DERIVATIVES = "derivatives."
-FACTOR_NAMES = (*FIN_NAMES, RACE)
-"""Names that may be factors of a derivative."""
 
 ABOVE_ZERO = ("mass", "density", "diameter", "radius", "area", "inertia")
 """Where the pattern gives no limits, a number whose name ends in one of these must be above zero."""
@@ -176,18 +153,14 @@ def _checked(source: Source, model: Source) -> tuple[dict[str, float], list[Prob
     """Return the values of a file, held against its pattern."""
     wanted, given = dict(leaves(model.table)), dict(leaves(source.table))
     if model is pattern("vehicle"):
-        wanted |= listed(given)
-    problems = [source.problem(key, *_no_such_key(key, wanted)) for key in given if key not in wanted]
+        wanted |= optional_leaves(given)
+    problems = [source.problem(key, *_no_such_key(key, wanted, given)) for key in given if key not in wanted]
     values, missing = {}, []
     for key, leaf in wanted.items():
         if key not in given and key in OPTIONAL:
             values[key] = OPTIONAL[key]
-        elif (
-            key not in given
-            and key.rpartition(".")[2] in OPTIONAL_OF_THRUSTER
-            and key.startswith("thrusters.")
-        ):
-            values[key] = OPTIONAL_OF_THRUSTER[key.rpartition(".")[2]]
+        elif key not in given and (default := value_left_out(key)) is not None:
+            values[key] = default
         elif key not in given:
             missing.append(
                 source.problem(
@@ -214,42 +187,16 @@ def _incomplete(source: Source, model: Source, missing: list[Problem]) -> Proble
     return replace(missing[0], line=None, key="", why=why, remedy=remedy)
 
 
-def listed(given: Mapping[str, Leaf]) -> Leaves:
-    """Return the pattern of what a vehicle may have besides: derivatives, lists such as thrusters, further sections.
-
-    Args:
-        given: dotted key → inline table of a file.
-    """
-    found: Leaves = {}
-    for section, units in LISTS.items():
-        names = dict.fromkeys(key.split(".")[1] for key in given if re.match(rf"{section}\.[^.]+\.", key))
-        found |= {f"{section}.{name}.{key}": {"unit": unit} for name in names for key, unit in units.items()}
-    for section, units in FURTHER.items():
-        if any(key.startswith(f"{section}.") for key in given):
-            found |= {f"{section}.{key}": {"unit": unit} for key, unit in units.items()}
-    for key in given:
-        if key.startswith(DERIVATIVES) and (unit := derivative_unit(key)):
-            found[key] = {"unit": unit}
-    return found
-
-
 def unit_of(kind: str, key: str) -> str:
     """Return the unit of a number that a file of a kind may leave out."""
-    return str((dict(leaves(pattern(kind).table)) | listed({key: {}}))[key]["unit"])
+    return str((dict(leaves(pattern(kind).table)) | optional_leaves({key: {}}))[key]["unit"])
 
 
-def derivative_unit(key: str) -> str | None:
-    """Return the unit of a derivative such as ``derivatives.K_pp``; None if it is none."""
-    name = key.removeprefix(DERIVATIVES)
-    if name == COMPLETE:
-        return "1"
-    found = parsed_name(name, FACTOR_NAMES)
-    return found.unit if found else None
-
-
-def _no_such_key(key: str, allowed: Mapping[str, Leaf]) -> tuple[str, str]:
+def _no_such_key(key: str, allowed: Mapping[str, Leaf], given: Mapping[str, Leaf]) -> tuple[str, str]:
     """Return why a key cannot be, and the remedy."""
-    if key.startswith(DERIVATIVES) and (said := complaint(key.removeprefix(DERIVATIVES), FACTOR_NAMES)):
+    if key.startswith(DERIVATIVES) and (
+        said := complaint(key.removeprefix(DERIVATIVES), factor_names(given))
+    ):
         return said[0], f"Allowed: {said[1]}."
     return "this file has no such key", nearest_or_all(key, allowed)
 
@@ -257,24 +204,11 @@ def _no_such_key(key: str, allowed: Mapping[str, Leaf]) -> tuple[str, str]:
 def _with_primes(source: Source) -> Source:
     """Return a vehicle file with a prime at the names of the derivatives without dimensions, those of unit "1"."""
     given = source.table.get(DERIVATIVES[:-1])
-    if not isinstance(given, Mapping):
-        return source
-    names = {
-        name: f"{name}'"
-        for name, leaf in given.items()
-        if isinstance(leaf, Mapping)
-        and leaf.get("unit") == "1"
-        and not name.endswith("'")
-        and name != COMPLETE
-    }
-    if not names:
+    names = primed_names(given) if isinstance(given, Mapping) else {}
+    if not names or not isinstance(given, Mapping):
         return source
     primed = {names.get(name, name): leaf for name, leaf in given.items()}
-    lines = {
-        f"{DERIVATIVES}{new}": source.lines[f"{DERIVATIVES}{name}"]
-        for name, new in names.items()
-        if f"{DERIVATIVES}{name}" in source.lines
-    }
+    lines = {f"{DERIVATIVES}{new}": source.line(f"{DERIVATIVES}{name}") or 0 for name, new in names.items()}
     table = source.table | {DERIVATIVES[:-1]: primed}
     return replace(source, table=table, lines=source.lines | lines)
 
@@ -375,7 +309,7 @@ def _numbers_by_key(
     raw = source.table.get(section, {})
     given = dict(_flat(raw)) if isinstance(raw, Mapping) else {}
     allowed = changeable() if given else {}
-    allowed |= {f"vehicle.{key}": leaf for key, leaf in listed(_of_vehicle(given)).items()}
+    allowed |= {f"vehicle.{key}": leaf for key, leaf in optional_leaves(_of_vehicle(given)).items()}
     found: dict[str, float] = {}
     problems = []
     for key, value in given.items():
@@ -383,7 +317,7 @@ def _numbers_by_key(
         if key not in allowed:
             why, remedy = "no vehicle and no cable has such a value", _nearest(key, allowed)
             if key.startswith(f"vehicle.{DERIVATIVES}"):
-                why, remedy = _no_such_key(key.removeprefix("vehicle."), allowed)
+                why, remedy = _no_such_key(key.removeprefix("vehicle."), allowed, _of_vehicle(given))
             problems.append(source.problem(place, why, remedy))
         elif complaint := complaint_of(value, allowed[key], key):
             problems.append(source.problem(place, *complaint, found=value))
@@ -393,8 +327,13 @@ def _numbers_by_key(
 
 
 def _of_vehicle(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keys of a vehicle among those of vehicle and cable."""
-    return {key.removeprefix("vehicle."): value for key, value in given.items() if key.startswith("vehicle.")}
+    """Return the keys of a vehicle among those of vehicle and cable, and a fin for each that a derivative names.
+
+    Which fins there are stands in the file of the vehicle; the vehicle itself refuses others.
+    """
+    own = {key.removeprefix("vehicle."): value for key, value in given.items() if key.startswith("vehicle.")}
+    names = [key.removesuffix("'").split("_", 2) for key in own if key.startswith(DERIVATIVES)]
+    return own | {f"fins.{parts[2]}.x": {} for parts in names if len(parts) > 2}
 
 
 def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

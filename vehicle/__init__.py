@@ -28,6 +28,7 @@ V, I, q_e      voltage, current, charge drawn        V, A, C     V_full − k q_
 """
 
 from vehicle.actuators import Servo
+from vehicle.channels import Channel
 from vehicle.dynamics import (
     POWERS,
     battery_voltage,
@@ -56,6 +57,7 @@ __all__ = [
     "STATE",
     "STATE_SIZE",
     "TERMS",
+    "Channel",
     "FreeRun",
     "Problem",
     "Servo",

@@ -25,12 +25,12 @@ import numpy as np
 
 from subzero.jit import compiled, gated_inlined, inlined, scratch
 from vehicle.actuators import fin_angle, servo_rate, settle
+from vehicle.channels import channel_rates
 from vehicle.kinematics import motion, normalise, rotation
 from vehicle.motor import battery_current, shaft_goal, shaft_rate, shaft_speed, voltage
 from vehicle.restoring import potential
 from vehicle.state import CHARGE, LINKAGE, SERVO, SHAFT
 from vehicle.terms import BREAKDOWN, POWER_OF_TERM, TERM_COUNT, fill_terms
-from vehicle.thrusters import thruster_rates
 
 if TYPE_CHECKING:
     from vehicle.vehicle import Vehicle, VehicleNumbers
@@ -99,8 +99,8 @@ def actuators(
         out[SERVO + i] = servo_rate(state[SERVO + i], state[LINKAGE + i], command[1 + i], numbers.servos[i])
         out[LINKAGE + i] = 0.0
     out[CHARGE] = battery_current(state[SHAFT], u, motor, propeller)
-    if numbers.thruster_count > 0:
-        thruster_rates(state, command, numbers.thrusters, numbers.thruster_count, out)
+    if numbers.channel_count > 0:
+        channel_rates(state, command, numbers.channels, numbers.channel_count, out)
 
 
 @compiled
@@ -138,8 +138,8 @@ def derivative(
     """Fill out with the rate of the state.
 
     Args:
-        state: as in `vehicle.STATE`, and the lagged command of each thruster behind it (`Vehicle.state_size`,).
-        command: propeller [rev/s], rudder, port plane, starboard plane [rad], and that of each thruster [-1 … 1].
+        state: as in `vehicle.STATE`, and the state of each channel behind it (`Vehicle.state_size`,).
+        command: propeller [rev/s], rudder, port plane, starboard plane [rad], and that of each channel.
         current_n: velocity of the water, earth axes. [m/s]
         wrench_b: external force and moment about the hull centre, body axes. [N, N m]
         numbers: `Vehicle.numbers()`.

@@ -44,8 +44,8 @@ class FinNumbers(Record):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fins(Section):
-    """One of two equal fins on opposite sides of the hull."""
+class FinShape(Section):
+    """Area and coefficients of a fin, wherever it stands."""
 
     area: float = parameter("plan area of one exposed fin, S", "m2", low=0.0)
     lift_slope: float = parameter("lift slope on the hull, C_La", "1/rad", low=0.0)
@@ -56,14 +56,12 @@ class Fins(Section):
     stall_angle: float = parameter(
         "incidence at which half the lift is lost, a_s", "rad", above=0.0, high=1.5
     )
-    station: float = parameter("centre of pressure, forward of the hull centre, x_f", "m")
-    arm: float = parameter("centre of pressure, distance from the axis", "m", low=0.0)
 
-    def numbers(self, density: float) -> FinNumbers:
+    def shape_numbers(self, density: float, x: float, arm: float) -> FinNumbers:
         """Return the numbers that the compiled fin needs."""
         return FinNumbers(
-            self.station,
-            self.arm,
+            x,
+            arm,
             0.5 * density * self.area,
             self.lift_slope,
             1.0 / (math.pi * self.span_efficiency * self.aspect_ratio),
@@ -71,6 +69,18 @@ class Fins(Section):
             self.normal_force_coefficient,
             math.sin(self.stall_angle),
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fins(FinShape):
+    """One of two equal fins on opposite sides of the hull."""
+
+    station: float = parameter("centre of pressure, forward of the hull centre, x_f", "m")
+    arm: float = parameter("centre of pressure, distance from the axis", "m", low=0.0)
+
+    def numbers(self, density: float) -> FinNumbers:
+        """Return the numbers that the compiled fin needs."""
+        return self.shape_numbers(density, self.station, self.arm)
 
 
 @gated_inlined

@@ -101,7 +101,7 @@ def free_run(
         vehicle: the vehicle, or its numbers.
         state: where it starts, for example from `initial_state`.
         commands: one command (4,) for the whole run, or one a step (n, 4): propeller [rev/s], rudder, port
-            plane, starboard plane [rad]; behind them one for each thruster [-1 … 1].
+            plane, starboard plane [rad]; behind them one for each channel.
         duration: how long. [s]
         step: of the Runge-Kutta scheme. [s]
         current_n: velocity of the water, earth axes. [m/s]
@@ -109,7 +109,7 @@ def free_run(
     """
     numbers = vehicle.numbers() if isinstance(vehicle, Vehicle) else vehicle
     steps = round(duration / step)
-    given, size = np.asarray(commands, dtype=float), STATE_SIZE + int(numbers.thruster_count)
+    given, size = np.asarray(commands, dtype=float), STATE_SIZE + int(numbers.channel_count)
     held = np.array(np.broadcast_to(given, (steps, given.shape[-1])))
     history = np.zeros((steps + 1, size + WORKS))
     history[0, : len(state)] = state

@@ -20,22 +20,28 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from subzero.derivative_names import FIN_NAMES, RACE, DerivativeName
 from subzero.errors import short
 from subzero.jit import Record, compiled, gated_inlined, scratch
-from vehicle.derivatives import Derivatives
+from vehicle.derivatives import Derivatives, factor_names
+from vehicle.fin_list import MOST_FINS, listed_angle
 from vehicle.parameters import Problem, Section, parameter
+
+if TYPE_CHECKING:
+    from vehicle.vehicle import VehicleNumbers
 
 MOST_PRODUCTS = 160
 """The compiled numbers hold so many products: one layout, so that all vehicles share one machine code."""
 MOST_FACTORS = 8
 """Factors of a product, with those that a prime brings. [-]"""
 LETTERS = ("1", "u", "v", "w", "p", "q", "r", "U", "n")
-FACTORS = len(LETTERS) + len(FIN_NAMES) + 1
-"""Factors there are: letters, fins and the race; behind their values stand their absolute values."""
+FIRST_FIN = len(LETTERS) + len(FIN_NAMES) + 1
+FACTORS = FIRST_FIN + MOST_FINS
+"""Factors there are: letters, fins, the race, listed fins; behind their values stand their absolute values."""
 VALUES = 2 * FACTORS
 SLOWEST = 1e-6
 """The race is that at this speed below it: its products have u as a factor, and stay finite. [m/s]"""
@@ -66,19 +72,23 @@ class Race(Section):
 NO_RACE = RaceNumbers(0.0, 0.0, 0.0)
 
 
-def product_problems(derivatives: Derivatives, race: Race | None) -> list[Problem]:
-    """Return the problems of derivatives of a vehicle: too many products, or a race that it says nothing of."""
+def product_problems(derivatives: Derivatives, fins: Sequence[str], race: Race | None) -> list[Problem]:
+    """Return the problems of derivatives of a vehicle: too many products, fins or a race that it does not have."""
     if race is not None and not isinstance(race, Race):
         return [Problem(key=RACE, found=short(race), why="this is no such part", allowed="a Race, or None")]
     count = count_of(derivatives.derivatives)
     if count > MOST_PRODUCTS:
         why, allowed = "so many have no room", f"up to {MOST_PRODUCTS}, besides those of a single velocity"
         return [Problem(key="derivatives", found=f"{count} products", why=why, allowed=allowed)]
-    in_race = [name for name, _ in derivatives.table if RACE in name]
-    if race or not in_race:
-        return []
-    why, allowed = "this vehicle has no section of its race", "[race] with advance and thrust_loading"
-    return [Problem(key=f"derivatives.{in_race[0]}", found="the factor race", why=why, allowed=allowed)]
+    names = {letters.strip("|") for name, _ in derivatives.derivatives for letters in name.factors}
+    missing = [name for name in derivatives.named if name in names - {*factor_names(fins)}]
+    if missing:
+        why, allowed = "this vehicle has no fin of this name", ", ".join(factor_names(fins))
+        return [Problem(key="derivatives", found=f"the factor {missing[0]}", why=why, allowed=allowed)]
+    if RACE in names and race is None:
+        why, allowed = "this vehicle has no section of its race", "[race] with advance and thrust_loading"
+        return [Problem(key="derivatives", found="the factor race", why=why, allowed=allowed)]
+    return []
 
 
 @gated_inlined
@@ -99,7 +109,7 @@ def table_of(
         named: names of factors, of `derivatives.factor_names`.
         terms: places of the terms "propeller", "quadratic_damping" and those of the fins.
     """
-    places = {name: i for i, name in enumerate((*LETTERS, *named))}
+    places = {name: i for i, name in enumerate((*LETTERS, *named))}  # of fins in the order of their list
     places |= {f"|{name}|": FACTORS + i for name, i in places.items()}
     table = np.zeros((MOST_PRODUCTS, 3 + MOST_FACTORS))
     products = [(name, value) for name, value in rows if name.kind == "product"]
@@ -128,36 +138,36 @@ def term_of(name: DerivativeName) -> str:
 
 @compiled
 def add_products(
+    state: np.ndarray,
     nu_r: np.ndarray,
     n: float,
     angles: tuple[float, float, float],
-    race: RaceNumbers,
-    table: np.ndarray,
-    count: int,
+    numbers: VehicleNumbers,
     terms: np.ndarray,
 ) -> None:
     """Add all products to terms (terms, 6) [N, N m].
 
     Args:
+        state: of the vehicle, for the angles of listed fins.
         nu_r: velocity relative to the water (u, v, w, p, q, r). [m/s, rad/s]
         n: shaft speed. [rev/s]
         angles: rudder, port plane, starboard plane in the water. [rad]
-        race: of the propeller.
-        table: `table_of` the derivatives.
-        count: rows in use.
+        numbers: VehicleNumbers.
         terms: added to.
     """
-    values = scratch(1, VALUES)[0]
+    values, table = scratch(1, VALUES)[0], numbers.products
     values[0] = 1.0
     for i in range(6):
         values[1 + i] = nu_r[i]
     values[7] = math.sqrt(nu_r[0] * nu_r[0] + nu_r[1] * nu_r[1] + nu_r[2] * nu_r[2])
     values[8] = n
     values[9], values[10], values[11] = angles[0], angles[1], angles[2]
-    values[12] = race_excess(n, nu_r[0], race)
+    values[12] = race_excess(n, nu_r[0], numbers.race)
+    for i in range(MOST_FINS):
+        values[FIRST_FIN + i] = listed_angle(state, angles, numbers.fins[i]) if i < numbers.fin_count else 0.0
     for i in range(FACTORS):
         values[FACTORS + i] = abs(values[i])
-    for i in range(count):
+    for i in range(numbers.product_count):
         product = table[i, 0]
         for k in range(MOST_FACTORS):
             product *= values[int(table[i, 3 + k])]

@@ -23,10 +23,14 @@ from vehicle.added_mass import munk_correction
 from vehicle.axial_drag import axial_drag
 from vehicle.body_lift import body_lift
 from vehicle.box_sections import add_section_drag
+from vehicle.buoyancy_engine import add_engines
 from vehicle.cross_flow import cross_flow_drag
 from vehicle.damping import linear_damping, quadratic_damping
 from vehicle.derivatives import add_damping
+from vehicle.fin_list import add_fins
 from vehicle.fins import rudder, stern_plane
+from vehicle.flow_axes import add_flow_axes
+from vehicle.moving_mass import add_moving_masses
 from vehicle.products import add_products
 from vehicle.propeller import propeller
 from vehicle.restoring import restoring
@@ -53,14 +57,14 @@ TERMS = (
     Term("added_mass_coriolis", "-C_A(nu_r) nu_r, Munk moment included", INERTIAL),
     Term("munk_correction", "(munk_factor - 1) times the Munk moment", LOSS),
     Term("turning_current", "-M (omega x v_c, 0), the current seen from a turning hull", INERTIAL),
-    Term("body_lift", "viscous lift of the hull and its moment", LOSS),
+    Term("body_lift", "viscous lift of the hull and its moment; forces in flow axes", LOSS),
     Term("cross_flow_drag", "strips of the hull across the flow", LOSS),
     Term("axial_drag", "drag of the hull along its axis", LOSS),
     Term("linear_damping", "further damping, linear, derivatives among it", LOSS),
     Term("quadratic_damping", "further damping, quadratic, derivatives among it", LOSS),
     Term("restoring", "weight and buoyancy", RESTORING),
-    Term("propeller", "thrust and reaction torque, of all thrusters too", PROPULSION),
-    Term("rudder", "upper and lower rudder", LOSS),
+    Term("propeller", "thrust and torque, of thrusters too; buoyancy engines, moved masses", PROPULSION),
+    Term("rudder", "upper and lower rudder, and the fins of a list", LOSS),
     Term("stern_plane_port", "port stern-plane", LOSS),
     Term("stern_plane_starboard", "starboard stern-plane", LOSS),
     Term("cable", "force and moment from outside: the pull of the cable", EXTERNAL),
@@ -112,6 +116,8 @@ def fill_terms(
     munk_correction(nu_r, numbers.added_mass, numbers.munk_excess, out[2])
     turning_current(nu, nu_r, numbers.mass_matrix, out[3])
     body_lift(nu_r, numbers.body_lift, out[4])
+    if numbers.winged:
+        add_flow_axes(nu_r, numbers.flow_axes, out[4])
     cross_flow_drag(nu_r, numbers.strips, out[5])
     if numbers.has_sections:
         add_section_drag(nu_r, numbers.section_strips, out[5])
@@ -124,10 +130,16 @@ def fill_terms(
     propeller(nu_r, n, numbers.propeller, out[10])
     if numbers.thruster_count > 0:
         add_thrusters(state, nu_r, numbers.thrusters, numbers.thruster_count, out[10])
+    if numbers.engine_count > 0:
+        add_engines(state, R, numbers.engines, numbers.engine_count, out[10])
     rudder(nu_r, angles[0], numbers.rudder, out[11])
+    if numbers.fin_count > 0:
+        add_fins(state, nu_r, angles, numbers.fins, numbers.fin_count, out[11])
     stern_plane(nu_r, angles[1], -1.0, numbers.stern_planes, out[12])
     stern_plane(nu_r, angles[2], 1.0, numbers.stern_planes, out[13])
     if numbers.product_count > 0:
-        add_products(nu_r, n, angles, numbers.race, numbers.products, numbers.product_count, out)
+        add_products(state, nu_r, n, angles, numbers, out)
     for i in range(6):
         out[14, i] = wrench_b[i]
+    if numbers.mass_count > 0:
+        add_moving_masses(state, R, numbers.masses, numbers.mass_count, numbers.mass_matrix, out, out[10])

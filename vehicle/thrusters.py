@@ -4,7 +4,7 @@
     T  = T_ahead |c|^e  or  −T_astern |c|^e                           thrust curve, at rest in the water
     F  = (T − k |c| u_a) d,   u_a = d · (v_r + ω × r)                 inflow along the direction d
     M  = r × F + h T d                                                h > 0: the motor's reaction, along d
-    s' = (clip((1 − lost) command, ±1) − s)/lag
+    s' = (clip((1 − lost) command, ±1) − s)/lag                       its channel (`vehicle.channels`)
 
 A command is a share, −1 full astern to 1 full ahead. Thrust acts along d, a unit vector of the body's axes: it pushes
 the hull that way when ahead. The curve is that of the thruster on its stand; `loss_per_inflow` is how much of full
@@ -22,15 +22,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from subzero.jit import compiled, inlined
+from vehicle.channels import Channel
 from vehicle.parameters import Section, parameter
-from vehicle.state import QUICKEST, STATE_SIZE
+from vehicle.state import STATE_SIZE
 
 MOST_THRUSTERS = 12
 """The compiled numbers hold so many thrusters: one layout, so that all vehicles share one machine code."""
 
-(PX, PY, PZ, DX, DY, DZ, AHEAD, ASTERN, EXPONENT, DEAD_BAND, INFLOW, REACTION, LAG, LOST) = range(14)
-COLUMNS = 14
-"""Columns of the compiled table: place, direction, curve, dead band, inflow, reaction arm, lag, lost share."""
+(PX, PY, PZ, DX, DY, DZ, AHEAD, ASTERN, EXPONENT, DEAD_BAND, INFLOW, REACTION) = range(12)
+COLUMNS = 12
+"""Columns of the compiled table: place, direction, curve, dead band, inflow, reaction arm."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,8 +71,16 @@ class Thruster(Section):
     def row(self) -> np.ndarray:
         """Return the row of the compiled table (COLUMNS,)."""
         curve = (self.thrust_ahead, self.thrust_astern, self.curve_exponent, self.dead_band)
-        rest = (self.loss_per_inflow, self.reaction_arm, self.lag, self.lost_command)
+        rest = (self.loss_per_inflow, self.reaction_arm)
         return np.array([self.x, self.y, self.z, *self.direction, *curve, *rest])
+
+    def channels(self, name: str) -> tuple[Channel, ...]:
+        """Return its command: the share of full thrust."""
+        meaning = f"command of the thruster {name}, -1 full astern to 1 full ahead"
+        lag, lost = self.lag, self.lost_command
+        return (
+            Channel(name=name, meaning=meaning, unit="1", low=-1.0, high=1.0, lag=lag, lost_command=lost),
+        )
 
 
 def table_of(thrusters: tuple[Thruster, ...]) -> np.ndarray:
@@ -120,16 +129,6 @@ def add_thrusters(
         out[3] += y * Z - z * Y + torque * a
         out[4] += z * X - x * Z + torque * b
         out[5] += x * Y - y * X + torque * c
-
-
-@compiled
-def thruster_rates(
-    state: np.ndarray, command: np.ndarray, table: np.ndarray, count: int, out: np.ndarray
-) -> None:
-    """Fill the rates of the lagged commands, out[STATE_SIZE …]; their commands stand behind the four of fins. [1/s]"""
-    for i in range(min(count, state.size - STATE_SIZE, command.size - 4)):
-        wanted = max(-1.0, min(1.0, (1.0 - table[i, LOST]) * command[4 + i]))
-        out[STATE_SIZE + i] = (wanted - state[STATE_SIZE + i]) / max(table[i, LAG], QUICKEST)
 
 
 def allocation(thrusters: tuple[Thruster, ...]) -> np.ndarray:

@@ -20,22 +20,40 @@ from vehicle.actuators import Servo, Servos
 from vehicle.added_mass import AddedMass
 from vehicle.axial_drag import AxialDrag
 from vehicle.body_lift import BodyLift
-from vehicle.box_sections import HullSection, section_problems, strips_of
+from vehicle.box_sections import HullSection, strips_of
+from vehicle.buoyancy_engine import BuoyancyEngine, EngineNumbers
+from vehicle.channels import Channel
 from vehicle.cross_flow import CrossFlowDrag
 from vehicle.damping import LinearDamping, QuadraticDamping
-from vehicle.derivatives import NO_DERIVATIVES, Derivatives, derivatives_of, is_table
+from vehicle.derivatives import NO_DERIVATIVES, Derivatives
+from vehicle.fin_list import Fin, ListedFinNumbers
 from vehicle.fins import FinNumbers, Fins
+from vehicle.flow_axes import NO_FLOW_AXES, FlowAxes
 from vehicle.geometry import Hull, TowPoint
+from vehicle.lists import (
+    DERIVATIVES,
+    FLOW_AXES,
+    FURTHER,
+    HULL_SECTIONS,
+    LISTS,
+    OPTIONAL,
+    channels_of,
+    further_problems,
+    list_problems,
+    listed_numbers,
+    read_optional,
+)
 from vehicle.motor import Battery, Motor, MotorNumbers, motor_numbers
+from vehicle.moving_mass import MovingMass, MovingMassNumbers
 from vehicle.parameters import Problem, Section, VehicleError, nearest, parameter, read_section
-from vehicle.products import NO_RACE, Race, RaceNumbers, count_of, product_problems
+from vehicle.products import NO_RACE, Race, RaceNumbers, count_of
 from vehicle.products import table_of as product_table_of
 from vehicle.propeller import Propeller, PropellerNumbers
 from vehicle.restoring import Buoyancy, RestoringNumbers
-from vehicle.rigid_body import ProductsOfInertia, RigidBody, inertia_problems
+from vehicle.rigid_body import ProductsOfInertia, RigidBody
 from vehicle.state import STATE_SIZE
 from vehicle.terms import BREAKDOWN
-from vehicle.thrusters import MOST_THRUSTERS, Thruster, table_of
+from vehicle.thrusters import Thruster, table_of
 
 
 class VehicleNumbers(Record):
@@ -67,6 +85,16 @@ class VehicleNumbers(Record):
     section_strips: np.ndarray
     thrusters: np.ndarray
     thruster_count: int
+    channels: np.ndarray
+    channel_count: int
+    fins: tuple[ListedFinNumbers, ...]
+    fin_count: int
+    engines: tuple[EngineNumbers, ...]
+    engine_count: int
+    masses: tuple[MovingMassNumbers, ...]
+    mass_count: int
+    winged: bool
+    flow_axes: np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +111,11 @@ class Vehicle:
 
     Attributes:
         derivatives: further damping and added mass, as a table; none for most.
-        thrusters: by name; none for a vehicle of one propeller and fins.
+        flow_axes: forces in flow axes, of a glider; none for most.
+        thrusters: by name, as all lists; none for a vehicle of one propeller, rudder and stern-planes.
+        fins: further fins, such as a tail in X.
+        moving_masses: such as a battery that slides and turns.
+        buoyancy_engines: such as an oil bladder.
         sections: by name, of a hull that is no body of revolution, for its cross-flow drag; none for a Myring hull.
         products_of_inertia: None for none.
         race: of the propeller, as a factor of derivatives; None where none has it.
@@ -109,7 +141,11 @@ class Vehicle:
     stern_plane_starboard_servo: Servo
     tow_point: TowPoint
     derivatives: Derivatives = NO_DERIVATIVES
+    flow_axes: FlowAxes = NO_FLOW_AXES
     thrusters: tuple[tuple[str, Thruster], ...] = ()
+    fins: tuple[tuple[str, Fin], ...] = ()
+    moving_masses: tuple[tuple[str, MovingMass], ...] = ()
+    buoyancy_engines: tuple[tuple[str, BuoyancyEngine], ...] = ()
     sections: tuple[tuple[str, HullSection], ...] = ()
     products_of_inertia: ProductsOfInertia | None = None
     race: Race | None = None
@@ -120,16 +156,13 @@ class Vehicle:
             Problem(
                 key=name, found=short(getattr(self, name)), why="this is no such part", allowed=kind.__name__
             )
-            for name, kind in {**SECTIONS, DERIVATIVES: Derivatives}.items()
+            for name, kind in {**SECTIONS, FLOW_AXES: FlowAxes, DERIVATIVES: Derivatives}.items()
             if not isinstance(getattr(self, name), kind)
         ]
-        problems = problems or [
-            *inconsistencies(self.hull, self.added_mass, self.derivatives, self.water.density),
-            *product_problems(self.derivatives, self.race),
-            *inertia_problems(self.rigid_body, self.products_of_inertia),
-        ]
-        problems += _thruster_problems(self.thrusters)
-        problems += section_problems(self.sections)
+        problems = problems or inconsistencies(
+            self.hull, self.added_mass, self.derivatives, self.water.density
+        )
+        problems += list_problems(self) or further_problems(self)
         if problems:
             raise VehicleError(tuple(problems))
 
@@ -139,9 +172,14 @@ class Vehicle:
         return tuple(thruster for _, thruster in self.thrusters)
 
     @property
+    def channels(self) -> tuple[Channel, ...]:
+        """The commands of its listed actuators, in the order of commands and states behind those of `vehicle.STATE`."""
+        return channels_of(self)
+
+    @property
     def state_size(self) -> int:
-        """Entries of its state: those of `vehicle.STATE`, and the lagged command of each thruster."""
-        return STATE_SIZE + len(self.thrusters)
+        """Entries of its state: those of `vehicle.STATE`, and one for each channel."""
+        return STATE_SIZE + len(self.channels)
 
     def numbers(self) -> VehicleNumbers:
         """Return the numbers of the compiled equations, a copy that may be changed.
@@ -201,6 +239,9 @@ class Vehicle:
             section_strips=strips_of(tuple(section for _, section in self.sections), density),
             thrusters=table_of(self.thruster_list),
             thruster_count=len(self.thrusters),
+            winged=self.flow_axes != NO_FLOW_AXES,
+            flow_axes=self.flow_axes.numbers(),
+            **listed_numbers(self),
         )
 
     def with_parameter(self, key: str, value: float) -> Vehicle:
@@ -265,11 +306,6 @@ SECTIONS: dict[str, type] = {
     "tow_point": TowPoint,
 }
 """Every section of a vehicle and the dataclass that reads it."""
-DERIVATIVES, THRUSTERS, HULL_SECTIONS = "derivatives", "thrusters", "sections"
-LISTS: dict[str, type] = {THRUSTERS: Thruster, HULL_SECTIONS: HullSection}
-"""Sections that a vehicle need not have, and that are lists: derivatives by name, a table for each thruster."""
-FURTHER: dict[str, type] = {"products_of_inertia": ProductsOfInertia, "race": Race}
-"""Sections of numbers that a vehicle need not have."""
 
 
 def to_mapping(vehicle: Vehicle) -> dict[str, dict[str, Any]]:
@@ -277,12 +313,14 @@ def to_mapping(vehicle: Vehicle) -> dict[str, dict[str, Any]]:
     mapping = {section: getattr(vehicle, section).by_name() for section in SECTIONS}
     if vehicle.derivatives:
         mapping[DERIVATIVES] = dict(vehicle.derivatives.table)
-    for listed in LISTS:
-        if rows := getattr(vehicle, listed):
-            mapping[listed] = {name: row.by_name() for name, row in rows}
+    if vehicle.flow_axes != NO_FLOW_AXES:
+        mapping[FLOW_AXES] = vehicle.flow_axes.by_name()
+    for section in (*LISTS, HULL_SECTIONS):
+        if rows := getattr(vehicle, section):
+            mapping[section] = {name: part.by_name() for name, part in rows}
     for section in FURTHER:
-        if found := getattr(vehicle, section):
-            mapping[section] = found.by_name()
+        if part := getattr(vehicle, section):
+            mapping[section] = part.by_name()
     return mapping
 
 
@@ -295,12 +333,15 @@ def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
     """
     problems = [
         Problem(
-            key=str(name), found="this table", why="no such section", allowed=nearest(name, list(SECTIONS))
+            key=str(name),
+            found="this table",
+            why="no such section",
+            allowed=nearest(name, [*SECTIONS, *OPTIONAL]),
         )
         for name in mapping
-        if name not in {*SECTIONS, *LISTS, *FURTHER, DERIVATIVES}
+        if name not in {*SECTIONS, *OPTIONAL}
     ]
-    sections: dict[str, Any] = _lists(mapping, problems)
+    sections: dict[str, Any] = read_optional(mapping, problems)
     for name, kind in SECTIONS.items():
         if name in mapping:
             sections[name] = read_section(kind, name, mapping[name], problems)
@@ -311,54 +352,6 @@ def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
     if problems:
         raise VehicleError(tuple(problems))
     return Vehicle(**sections)
-
-
-def _lists(mapping: Mapping[str, object], problems: list[Problem]) -> dict[str, Any]:
-    """Return what a mapping has besides `SECTIONS`: derivatives, lists, further sections; note their problems."""
-    found: dict[str, Any] = {
-        name: read_section(kind, name, mapping[name], problems)
-        for name, kind in FURTHER.items()
-        if name in mapping
-    }
-    tables = {name: mapping[name] for name in (DERIVATIVES, *LISTS) if name in mapping}
-    for name, table in tables.items():
-        if not isinstance(table, Mapping):
-            allowed = "a table of numbers" if name == DERIVATIVES else f"a table of tables, [{name}.name]"
-            problems.append(Problem(key=name, found=short(table), why="a table is needed", allowed=allowed))
-        elif name == DERIVATIVES:
-            try:
-                found[name] = derivatives_of(table)
-            except VehicleError as error:
-                problems.extend(error.problems)
-        else:
-            kind = LISTS[name]
-            found[name] = tuple(
-                (str(key), read_section(kind, f"{name}.{key}", values, problems))
-                for key, values in table.items()
-            )
-    return found
-
-
-def _thruster_problems(thrusters: tuple[tuple[str, Thruster], ...]) -> list[Problem]:
-    """Return the problems of a list of thrusters that are valid by themselves."""
-    if not is_table(thrusters) or not all(isinstance(each, Thruster) for _, each in thrusters):
-        why, allowed = "this is no such part", "pairs of a name and a vehicle.thrusters.Thruster"
-        return [Problem(key=THRUSTERS, found=short(thrusters), why=why, allowed=allowed)]
-    problems = [
-        Problem(
-            key=f"{THRUSTERS}.{name}.direction_x",
-            found="a direction of length 0",
-            why="it pushes nowhere",
-            allowed="a vector of the body's axes; its length does not matter",
-        )
-        for name, thruster in thrusters
-        if not thruster.direction.any()
-    ]
-    if len(thrusters) > MOST_THRUSTERS:
-        why = "so many have no room"
-        allowed = f"up to {MOST_THRUSTERS}"
-        problems.append(Problem(key=THRUSTERS, found=f"{len(thrusters)} thrusters", why=why, allowed=allowed))
-    return problems
 
 
 def inconsistencies(

@@ -185,7 +185,7 @@ def setup_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Setup:
     added, terms = (model.missing or NOTHING).numbers()
     return Setup(
         fixed=_fixed(trial, model, tethered, bool(added.size or terms.size)),
-        orders=_orders(trial, len(model.vehicle.thrusters)),
+        orders=_orders(trial, len(model.vehicle.channels)),
         track=_track(trial),
         water=model.water().numbers(),
         led=drum_direction(trial, model, _wet_length(trial)),
@@ -296,13 +296,13 @@ def _as_joint(cable: CableProperties, vehicle: Vehicle, length: float) -> CableP
     return replace(cable, compliance=compliance, internal_damping=damping)
 
 
-def _orders(trial: scenarios.Trial, thrusters: int) -> Orders:
-    """Return the commands, none for a prescribed motion; those of thrusters are zero, or written by station keeping."""
+def _orders(trial: scenarios.Trial, channels: int) -> Orders:
+    """Return the commands, none for a prescribed motion; those of channels are zero, or written by station keeping."""
     if trial.commands is None or trial.station is not None:
-        return Orders(np.zeros(1), np.zeros((1, 4 + thrusters)))
+        return Orders(np.zeros(1), np.zeros((1, 4 + channels)))
     values = np.array(trial.commands.values, dtype=float)
-    if thrusters:
-        values = np.concatenate([values, np.zeros((values.shape[0], thrusters))], axis=1)
+    if channels:
+        values = np.concatenate([values, np.zeros((values.shape[0], channels))], axis=1)
     return Orders(np.array(trial.commands.time, dtype=float), values)
 
 

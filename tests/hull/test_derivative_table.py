@@ -7,6 +7,8 @@ Configuration: an open frame on which nothing else acts. Tolerance: rounding (1e
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -275,6 +277,28 @@ def test_a_race_that_nobody_described_is_refused():
     }
     with pytest.raises(VehicleError, match=r"\[race\] with advance and thrust_loading"):
         from_mapping(numbers)
+
+
+FIN = dict.fromkeys(("area", "lift_slope", "profile_drag_coefficient", "normal_force_coefficient"), 0.0)
+FIN |= dict.fromkeys(("aspect_ratio", "span_efficiency", "stall_angle", "rate_limit"), 1.0)
+FIN |= dict.fromkeys(("x", "y", "z", "span_angle", "rudder_share", "plane_share", "roll_share"), 0.0)
+FIN |= {"lag": 0.1, "offset": 0.0, "deflection_limit": 0.5, "lost_command": 0.0}
+
+
+def test_the_angle_of_a_listed_fin_is_a_factor_by_its_name():
+    """Two bow planes without lift of their own: what they do stands in the table."""
+    fins = {"bow_port": FIN, "bow_starboard": FIN}
+    bows = hull({"Z_uu_bow_port": -4.0, "M_uu_bow_starboard": 3.0, "X_uu_bow_port2": -1.0}, fins=fins)
+    state = np.append(initial_state(velocity=NU), (0.2, -0.9))
+    found = breakdown_table(bows, state, np.zeros(6))["rudder"]
+    expected = (
+        np.array([-1.0 * 0.2**2, 0, -4.0 * 0.2, 0, 3.0 * -0.5, 0]) * U * abs(U)
+    )  # the second is at its limit
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    with pytest.raises(VehicleError, match=r"no factor is called 'bow_left'\. Allowed: Z_uu_bow_"):
+        hull({"Z_uu_bow_left": -4.0}, fins=fins)
+    with pytest.raises(VehicleError, match="this vehicle has no fin of this name"):
+        replace(bows, fins=bows.fins[1:])
 
 
 UNITS = {"X_u": "kg/s", "X_uu": "kg/m", "X_udot": "kg", "Y_rdot": "kg m", "K_pp": "kg m2", "N_ur": "kg m",
