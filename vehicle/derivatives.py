@@ -148,6 +148,11 @@ class Derivatives:
         """What the names say, and the values as they stand in the file."""
         return [(self.parsed(name), value) for name, value in self.table if name != COMPLETE]
 
+    @property
+    def factors(self) -> frozenset[str]:
+        """The factors of all derivatives, without bars: letters, and names of fins."""
+        return frozenset(factor.strip("|") for name, _ in self.derivatives for factor in name.factors)
+
     def with_dimensions(self, density: float, length: float) -> list[tuple[DerivativeName, float]]:
         """Return the derivatives in SI units, those with a prime times what belongs to it.
 

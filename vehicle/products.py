@@ -80,12 +80,12 @@ def product_problems(derivatives: Derivatives, fins: Sequence[str], race: Race |
     if count > MOST_PRODUCTS:
         why, allowed = "so many have no room", f"up to {MOST_PRODUCTS}, besides those of a single velocity"
         return [Problem(key="derivatives", found=f"{count} products", why=why, allowed=allowed)]
-    names = {letters.strip("|") for name, _ in derivatives.derivatives for letters in name.factors}
-    missing = [name for name in derivatives.named if name in names - {*factor_names(fins)}]
+    used = derivatives.factors
+    missing = [name for name in derivatives.named if name in used - {*factor_names(fins)}]
     if missing:
         why, allowed = "this vehicle has no fin of this name", ", ".join(factor_names(fins))
         return [Problem(key="derivatives", found=f"the factor {missing[0]}", why=why, allowed=allowed)]
-    if RACE in names and race is None:
+    if RACE in used and race is None:
         why, allowed = "this vehicle has no section of its race", "[race] with advance and thrust_loading"
         return [Problem(key="derivatives", found="the factor race", why=why, allowed=allowed)]
     return []
