@@ -2,7 +2,7 @@
 
     [thrusters.front_port]       [fins.upper_port]       [moving_masses.battery]       [buoyancy_engines.bladder]
 
-`vehicle.lists` has the meaning of their numbers; here are the units, and what a file may leave out.
+`vehicle.lists` has the meaning of their numbers; here are the units, and the keys that a file may leave out.
 """
 
 from __future__ import annotations

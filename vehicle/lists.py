@@ -34,7 +34,7 @@ LISTS: dict[str, tuple[type, int]] = {
     "moving_masses": (MovingMass, MOST_MASSES),
     "buoyancy_engines": (BuoyancyEngine, MOST_ENGINES),
 }
-"""Lists of actuators that a vehicle may have: a table for each by its name; what each is, and how many there may be."""
+"""Lists of actuators that a vehicle may have: a table for each by its name; its kind, and how many there may be."""
 HULL_SECTIONS = "sections"
 """A table for each section of a hull that is no body of revolution, by its name."""
 FURTHER: dict[str, type] = {"products_of_inertia": ProductsOfInertia, "race": Race}

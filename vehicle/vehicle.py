@@ -172,6 +172,18 @@ class Vehicle:
         return tuple(thruster for _, thruster in self.thrusters)
 
     @property
+    def has_rudder(self) -> bool:
+        """Whether a fin, or a derivative, answers the rudder's command."""
+        listed = any(fin.rudder_share and fin.area for _, fin in self.fins)
+        return self.rudder.area > 0.0 or listed or "rudder" in self.derivatives.factors
+
+    @property
+    def has_stern_planes(self) -> bool:
+        """Whether a fin, or a derivative, answers the commands of the stern-planes."""
+        listed = any(fin.plane_share and fin.area for _, fin in self.fins)
+        return self.stern_planes.area > 0.0 or listed or "stern_plane_port" in self.derivatives.factors
+
+    @property
     def channels(self) -> tuple[Channel, ...]:
         """The commands of its listed actuators, in the order of commands and states behind those of `vehicle.STATE`."""
         return channels_of(self)

@@ -287,9 +287,9 @@ def _check_actuators(line: Manoeuvre, name: str, model: Model) -> None:
     """Raise an error for a vehicle that lacks what a manoeuvre moves."""
     hull = model.vehicle
     lacking = [] if hull.propeller.thrust_constant > 0.0 else ["propeller"]
-    fins = {"rudder": hull.rudder, "stern-planes": hull.stern_planes}
+    fins = {"rudder": hull.has_rudder, "stern-planes": hull.has_stern_planes}
     moved = {ZigZag: "rudder", TurningCircle: "rudder", Spiral: "rudder", VerticalZigZag: "stern-planes"}
-    lacking += [fin for fin, section in fins.items() if moved.get(line.program) == fin and not section.area]
+    lacking += [fin for fin, there in fins.items() if moved.get(line.program) == fin and not there]
     if lacking:
         other = " Its thrusters keep a station: see rov_turn." if hull.thrusters else ""
         raise UserError(f"{name} needs a {' and a '.join(lacking)}, and this vehicle has none.{other}")

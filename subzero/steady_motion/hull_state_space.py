@@ -156,6 +156,7 @@ def ideal(hull: Vehicle) -> Vehicle:
     lag = max(hull.motor.lag, QUICKEST)
     return replace(
         hull,
+        fins=tuple((name, replace(fin, deflection_limit=pi)) for name, fin in hull.fins),
         motor=replace(hull.motor, lag=lag, speed_per_volt=inf, voltage_sensitivity=0.0),
         rudder_servo=servo(hull.rudder_servo),
         stern_plane_port_servo=servo(hull.stern_plane_port_servo),
