@@ -21,15 +21,10 @@ CORNERS = {
     "upper_starboard": ("rudder", -90.0),
 }
 """Name of a fin → the section that it was in, and the direction of its span in the cross [degree]."""
-SHAPE = [
-    "area",
-    "lift_slope",
-    "aspect_ratio",
-    "span_efficiency",
-    "profile_drag_coefficient",
-    "normal_force_coefficient",
-    "stall_angle",
-]
+SHAPE = (
+    *("area", "lift_slope", "aspect_ratio", "span_efficiency"),
+    *("profile_drag_coefficient", "normal_force_coefficient", "stall_angle"),
+)
 SHARES = ("rudder_share", "plane_share", "roll_share")
 
 
