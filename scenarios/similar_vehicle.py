@@ -398,8 +398,8 @@ def _drag(number: Any, speed: float) -> float:
     ) + 0.5 * sum(
         number(f"fins.{name}.area") * number(f"fins.{name}.profile_drag_coefficient") for name in CORNERS
     )
-    linear, square = (number(f"derivatives.X_{name}") for name in ("u", "uu"))
-    hull += rho * fins - square
+    linear, square, primed = (number(f"derivatives.X_{name}") for name in ("u", "uu", "uu'"))
+    hull += rho * fins - square - 0.5 * rho * number("hull.length") ** 2 * primed
     return float(hull * speed**2 - (linear + number("linear_damping.surge")) * speed)
 
 

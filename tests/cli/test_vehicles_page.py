@@ -52,7 +52,7 @@ def test_the_files_of_the_page_are_files(tmp_path):
     "change, said",
     [
         (("base = ", "bose = "), "numbers of a vehicle are missing"),
-        (("X_u = ", "X_q7 = "), "no such key"),
+        (("X_u = ", "X_q7 = "), "no such derivative"),
         (('unit = "kg/s"', 'unit = "kg"'), 'unit = "kg/s"'),
         (("thrust_ahead = ", "thrust_forward = "), "Did you mean 'thrusters.front_port."),
         (("thrust_ahead = { value = 30.4", "thrust_ahead = { value = -1.0"), "thrust at full command ahead"),
