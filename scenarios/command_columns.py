@@ -77,9 +77,7 @@ def command_faults(listed: Sequence[str], values: np.ndarray, vehicle: Table) ->
         beyond = column[(column < low) | (column > high)]
         if beyond.size:
             found = f"{beyond[0] / known[name].scale:g} {known[name].unit}".removesuffix(" 1")
-            faults.append(
-                (f"commands.{name}", found, "this is outside its limits", known[name].allowed)
-            )
+            faults.append((f"commands.{name}", found, "this is outside its limits", known[name].allowed))
     return faults
 
 
@@ -106,7 +104,9 @@ def _absent(vehicle: Table) -> set[str]:
     absent = set()
     if not vehicle.get("propeller", {}).get("thrust_constant", 1.0):
         absent.add("propeller_rps")
-    if not vehicle.get("rudder", {}).get("area", 1.0) and not any(fin.get("rudder_share") for fin in followed):
+    if not vehicle.get("rudder", {}).get("area", 1.0) and not any(
+        fin.get("rudder_share") for fin in followed
+    ):
         absent.add("rudder_deg")
     follows = any(fin.get("plane_share") or fin.get("roll_share") for fin in followed)
     if not vehicle.get("stern_planes", {}).get("area", 1.0) and not follows:

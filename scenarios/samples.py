@@ -172,9 +172,7 @@ def _check_start(source: Source, samples: Samples | None) -> list[Problem]:
     return [source.problem(f"start.{key}", why, remedy, found=start[key]) for key in given]
 
 
-def _read_kind(
-    source: Source, kind: str, given: Given, rows: Rows
-) -> tuple[Samples | None, list[Problem]]:
+def _read_kind(source: Source, kind: str, given: Given, rows: Rows) -> tuple[Samples | None, list[Problem]]:
     """Return the samples of a section: from the file that replaces it, the file that it names, or itself."""
     if kind in given:
         return read_csv(Path(given[kind]), str(given[kind]), kind, rows)
@@ -402,8 +400,9 @@ def _header_problems(
             continue
         if column not in allowed:
             more = {row.name for row in COMMANDS} < set(allowed)
-            why, remedy = "there is no such column", (nearest_and_all if more else nearest_or_all)(
-                column, allowed
+            why, remedy = (
+                "there is no such column",
+                (nearest_and_all if more else nearest_or_all)(column, allowed),
             )
         elif column in columns[:at]:
             why, remedy = "this column stands twice", "Keep one of the two."

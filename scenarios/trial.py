@@ -367,8 +367,8 @@ class Trial:
             check.say("motion", ends_early(self.duration), REACH_THE_END, float(self.motion.time[-1]))
         if self.motion is not None and self.start.at_trim:
             check.say("start", "a prescribed motion says how it starts", "Leave out at_trim.")
-        for name, found, why, remedy in misfits({n: getattr(self, n) for n in RUN_FIELDS} | vars(self.start)):
-            check.say(name, why, remedy, found)
+        for name, value, why, remedy in misfits({n: getattr(self, n) for n in RUN_FIELDS} | vars(self.start)):
+            check.say(name, why, remedy, value)
         if self.commands is not None and self.commands.listed:
             for key, found, why, remedy in command_faults(
                 self.commands.listed, self.commands.values, self.vehicle

@@ -255,9 +255,14 @@ def listed_channels(command: Listed) -> tuple[Channel, Channel]:
     unit = {"rad": "degree"}.get(command.unit, command.unit)
     symbol = rf"\mathrm{{{command.name.replace('_', '~')}}}"
     return (
-        Channel(name=f"{command.name}_state", unit=unit, symbol=symbol, long_name=f"{command.meaning}, lagged"),
         Channel(
-            name=f"{command.name}_command", unit=unit, symbol=symbol, long_name=f"{command.meaning}, commanded"
+            name=f"{command.name}_state", unit=unit, symbol=symbol, long_name=f"{command.meaning}, lagged"
+        ),
+        Channel(
+            name=f"{command.name}_command",
+            unit=unit,
+            symbol=symbol,
+            long_name=f"{command.meaning}, commanded",
         ),
     )
 

@@ -118,7 +118,11 @@ def actuators(runs: Runs, title: Title) -> Figure | None:
     for axes, name in zip(panels, shown, strict=False):
         channel_panel(axes, {which: run}, f"{name}_state")
         axes.step(
-            run["time"].values, run[f"{name}_command"].values, where="post", label="commanded", **style.COMMAND
+            run["time"].values,
+            run[f"{name}_command"].values,
+            where="post",
+            label="commanded",
+            **style.COMMAND,
         )
         headline(axes, name.replace("_", " ").capitalize())
     for axes in panels[len(shown) :]:

@@ -83,8 +83,7 @@ def encode(actors: tuple[Actor, ...], record: Record | None = None) -> dict[str,
         "drum_on_vessel": parameters.get("vessel") is not None,
         "sea_bed": float(first.attrs.get("sea_bed_m", 0.0)) or None,
         "channels": {
-            channel.name: {"unit": channel.unit, "words": channel.long_name}
-            for channel in channels_of(first)
+            channel.name: {"unit": channel.unit, "words": channel.long_name} for channel in channels_of(first)
         },
         "actors": [_actor(actor) for actor in actors],
         "measured": None if record is None else _measured(record),

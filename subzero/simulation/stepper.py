@@ -225,11 +225,11 @@ class Simulator:
         given = self._by_name(command) if isinstance(command, Mapping) else command
         try:
             numbers = [float(value + 0.0) for value in given]  # no text is a number
-            if len(numbers) in (len(FOUR), len(FOUR) + len(self._channels)) and all(map(isfinite, numbers)):
-                self._check_station(numbers)
-                return numbers
         except (TypeError, ValueError, OverflowError):
-            pass
+            numbers = []
+        if len(numbers) in (len(FOUR), len(FOUR) + len(self._channels)) and all(map(isfinite, numbers)):
+            self._check_station(numbers)
+            return numbers
         listed = f"; or these and those of {', '.join(self._channels)}" if self._channels else ""
         raise CommandError(
             f"At t = {self.time:g} s the command is {short(command)}. Allowed: four finite numbers,"

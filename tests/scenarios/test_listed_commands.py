@@ -115,14 +115,12 @@ def test_commands_made_in_python_are_held_against_the_vehicle(trial_of):
 
     def given(name, value):
         values = np.array([[0.0, 0.0, 0.0, 0.0, value]])
-        return replace(
-            trial, commands=scenarios.Commands(time=np.zeros(1), values=values, listed=(name,))
-        )
+        return replace(trial, commands=scenarios.Commands(time=np.zeros(1), values=values, listed=(name,)))
 
     assert given("aft_port", 0.5).commands.values[0, 4] == 0.5
     with pytest.raises(scenarios.ScenarioError, match=r"Did you mean 'aft_port'\? Allowed: front_starboard"):
         given("aft_prt", 0.5)
-    with pytest.raises(scenarios.ScenarioError, match="commands.aft_port: found '2', .* limits"):
+    with pytest.raises(scenarios.ScenarioError, match=r"commands.aft_port: found '2', .* limits"):
         given("aft_port", 2.0)
     with pytest.raises(subzero.UserError, match="commands 'aft_port', and this vehicle has no such actuator"):
         subzero.simulate(trial, model=subzero.Model.of(subzero.load_scenario("fig6")))
@@ -138,7 +136,7 @@ def test_a_stepped_run_takes_names_or_numbers_and_gives_the_same_bits(trial_of):
         while stepped.time < 2.0 - 1e-9:
             stepped.step(command)
         np.testing.assert_array_equal(stepped.result()["north"].values, whole["north"].values)
-    with pytest.raises(subzero.UserError, match="'aft_prt', .*Did you mean 'aft_port'"):
+    with pytest.raises(subzero.UserError, match=r"'aft_prt', .*Did you mean 'aft_port'"):
         stepped.step({"aft_prt": 0.3})
     with pytest.raises(subzero.UserError, match="keep the station of 'rov_hover'"):
         subzero.Simulator("rov_hover").step({"aft_port": 0.3})
