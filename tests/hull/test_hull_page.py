@@ -69,10 +69,16 @@ def inputs(seed):
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("changes", CHANGED)
-@pytest.mark.parametrize("name", ["subzero2", "remus100", "bluerov2_heavy", "xfin_auv", "seawing"])
+@pytest.mark.parametrize(
+    "name", ["subzero2", "remus100", "bluerov2_heavy", "xfin_auv", "seawing", "nps_auv2"]
+)
 def test_the_page_is_the_hull(name, changes, seed):
     numbers = numbers_of(name)
-    in_tables = name in ("bluerov2_heavy", "seawing")  # their added mass is in a table, their fins are none
+    in_tables = name in (
+        "bluerov2_heavy",
+        "seawing",
+        "nps_auv2",
+    )  # their added mass is in a table, their fins are none
     own = {} if in_tables else CHANGED[changes]
     for section, values in own.items():
         numbers[section] |= values
