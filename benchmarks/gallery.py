@@ -60,6 +60,8 @@ GALLERY = (
           figures=("deployment", "cable")),
     Shown(title="A remotely operated vehicle on station", commands=("subzero compare rov_turn",), folder="rov_turn",
           figures=("station",)),
+    Shown(title="A glider", commands=("subzero simulate glider_sawtooth --untethered",), folder="glider_sawtooth",
+          figures=("actuators",)),
     Shown(title="A manoeuvre", commands=("subzero manoeuvre zigzag",), folder="zigzag", figures=("manoeuvre",)),
     Shown(title="An autopilot", commands=("subzero autopilot heading_step --autopilot lqr --feed-forward model",),
           folder="heading_step", figures=("manoeuvre",)),
