@@ -52,7 +52,7 @@ def trial_of(tmp_path):
 
 
 def with_fin(numbers: dict) -> dict:
-    return numbers | {"fins": {"upper": FIN}}
+    return numbers | {"fins": numbers.get("fins", {}) | {"upper": FIN}}
 
 
 @pytest.mark.parametrize("name", shipped("vehicles"))
