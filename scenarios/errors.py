@@ -71,6 +71,13 @@ def nearest(word: str, allowed: Iterable[str]) -> str | None:
     return by_lower[close[0]] if close else None
 
 
+def nearest_and_all(word: str, allowed: Iterable[str]) -> str:
+    """Return the nearest allowed word, if one is near, and all of them."""
+    words = list(allowed)
+    close = nearest(word, words)
+    return (f"Did you mean '{close}'? " if close else "") + f"Allowed: {', '.join(words)}."
+
+
 def nearest_or_all(word: str, allowed: Iterable[str]) -> str:
     """Return ``Did you mean 'x'?`` with the nearest allowed word; all allowed words if none is near."""
     words = list(allowed)

@@ -12,13 +12,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from scenarios.checks import Checks
 from scenarios.heading import continuous, expected
-from scenarios.quantities import COMMANDS, INTERPOLATIONS, LINEAR, MOTION, SMOOTH, by_field
+from scenarios.quantities import COMMANDS, INTERPOLATIONS, LINEAR, MOTION, SMOOTH, Quantity, by_field
 from scenarios.steps import held
 from subzero.errors import short as shown
 
@@ -32,32 +32,44 @@ GAP_RATIO = 5.0
 REACH_THE_END = "Give samples to the end of the run, or shorten the duration to the last of them."
 
 
+ANY_COMMAND = Quantity(
+    name="", unit="1", low=-1e6, high=1e6, default=0.0, meaning="its unit and limits are the actuator's"
+)
+"""Of a listed actuator, as far as one knows without its vehicle."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Commands:
     """The commands to the actuators; each sample is held until the next, the last one to the end.
 
     Attributes:
         time: starts at 0 and increases. Shape (samples,). [s]
-        values: propeller [rev/s], rudder [rad], port and starboard stern-plane [rad]. Shape (samples, 4).
+        values: propeller [rev/s], rudder [rad], port and starboard stern-plane [rad], and one for each of `listed`, in
+            its own unit. Shape (samples, 4 and more).
+        listed: names of listed actuators that are commanded, as in `vehicle.Vehicle.channels`; the others stand at 0.
     """
 
     time: np.ndarray
     values: np.ndarray
+    listed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         """Raise an error if the fields do not form commands; keep arrays of their own that cannot be changed."""
         check = Checks(self)
         time = check.rows("time", COMMANDS[:1])
-        values = check.rows("values", COMMANDS[1:], None if time is None else time.size)
+        further = tuple(replace(ANY_COMMAND, name=str(name)) for name in self.listed)
+        values = check.rows("values", COMMANDS[1:] + further, None if time is None else time.size)
         if time is not None:
             check.increasing("time", time)
+        if len(set(self.listed)) < len(self.listed):
+            check.say("listed", "a name stands twice", "Give each actuator one column.", self.listed)
         check.refuse()
         assert time is not None and values is not None  # noqa: PT018  # `refuse` has seen to it
         check.freeze("time", time)
         check.freeze("values", values)
 
     def at(self, time: np.ndarray | float) -> np.ndarray:
-        """Return the commands at some times, the sample that holds: shape of `time`, then (4,).
+        """Return the commands at some times, the sample that holds: shape of `time`, then (4 and more,).
 
         >>> fin = Commands(time=np.array([0.0, 2.0]), values=np.array([[9.0, 0.0, 0.0, 0.0], [9.0, 0.1, 0.0, 0.0]]))
         >>> fin.at(np.array([0.0, 1.9, 2.0, 50.0]))[:, 1].tolist()

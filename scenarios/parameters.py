@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from scenarios.command_columns import actuator_of, listed_columns
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source
 from scenarios.parts import (
@@ -411,7 +412,11 @@ def _columns(trial: Trial, section: str) -> list[tuple[Quantity, np.ndarray]]:
     if section == "winch":
         row = SETPOINT[part.control]
         return [] if row is None else [(WINCH[0], np.array(part.time)), (row, np.array(part.setpoint))]
-    first, *others = {"commands": COMMANDS, "vessel": VESSEL, "water": PROFILE}[section]
+    rows = {"commands": COMMANDS, "vessel": VESSEL, "water": PROFILE}[section]
+    if section == "commands":
+        listed = {actuator_of(column): column for column in listed_columns(trial.vehicle)}
+        rows += tuple(listed[name] for name in part.listed)
+    first, *others = rows
     table = np.asarray(part.values if section == "commands" else part.velocity, dtype=float)
     along = part.depth if section == "water" else part.time
     return [(first, np.asarray(along, dtype=float)), *zip(others, table.T, strict=True)]

@@ -15,6 +15,7 @@ from math import remainder, tau
 from pathlib import Path
 from typing import Any, TypeVar
 
+from scenarios.command_columns import command_columns, listed_columns
 from scenarios.errors import Problem, ScenarioError
 from scenarios.files import Source, find
 from scenarios.instructions import Motion
@@ -101,7 +102,8 @@ def load(
     }
     samples = {}
     if given or "station" not in reading.source.table:
-        samples = reading.keep(read_instructions(reading.source, given, run.get("duration_s")))
+        columns = command_columns(vehicle)
+        samples = reading.keep(read_instructions(reading.source, given, run.get("duration_s"), columns))
     if "motion" not in samples:
         reading.problems.extend(check_trim(reading.source, start))
     if reading.problems:
@@ -129,7 +131,7 @@ def load(
         drum=cable["drum"],
         tolerances=tolerances,
         **around,
-        commands=commands(samples["commands"]) if "commands" in samples else None,
+        commands=commands(samples["commands"], listed_columns(vehicle)) if "commands" in samples else None,
         motion=prescribed,
     )
 

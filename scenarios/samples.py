@@ -5,7 +5,8 @@ a log*: a row of a file holds until the next, the last one for one sampling inte
 A log that ends before the run does is refused, because what was commanded after it is not
 known. A smooth motion is known only as far as its last sample, and not where samples are missing, inline or not.
 
-A CSV file has one header line with the columns of `scenarios.quantities`, in any order, then one row a sample. Empty
+A CSV file has one header line with the columns of `scenarios.quantities`, and of commands those of
+`scenarios.command_columns`, in any order, then one row a sample. Empty
 lines and lines that start with ``#`` are remarks. Commands and a motion may stand in the file that a run writes
 (``rudder_command_deg`` is the ``rudder_deg`` that was commanded): its other channels are passed over.
 """
@@ -23,7 +24,8 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import Problem, ScenarioError, nearest_or_all
+from scenarios.command_columns import actuator_of, written_column
+from scenarios.errors import Problem, ScenarioError, nearest_and_all, nearest_or_all
 from scenarios.files import Source, read_text
 from scenarios.heading import continuous, contradicted, expected
 from scenarios.instructions import (
@@ -65,6 +67,9 @@ WRITTEN: dict[str, dict[str, str]] = {
     "motion": {},
 }
 """Section → the column of a file that a run writes → the column of the section that it is."""
+
+Rows = tuple[Quantity, ...]
+"""Columns that a section may have."""
 
 Row = tuple[int, list[str]]
 """Line in the file, from 1, and the cells."""
@@ -110,7 +115,7 @@ class Samples:
 
 
 def read_instructions(
-    source: Source, given: Given, duration: float | None
+    source: Source, given: Given, duration: float | None, command_rows: Rows = COMMANDS
 ) -> tuple[dict[str, Samples], list[Problem]]:
     """Read the commands or the motion of a trial.
 
@@ -118,6 +123,7 @@ def read_instructions(
         source: the trial file.
         given: a file of commands that replaces those of the trial, or of a motion that replaces whatever it says.
         duration: how long the run lasts; None if that is wrong itself. [s]
+        command_rows: the columns that the commands of its vehicle may have.
 
     Returns:
         ``commands`` or ``motion`` → its samples; and the problems.
@@ -128,7 +134,7 @@ def read_instructions(
     problems = _check_kinds(source, kinds, given)
     found: dict[str, Samples] = {}
     for kind in kinds:
-        samples, wrong = _read_kind(source, kind, given)
+        samples, wrong = _read_kind(source, kind, given, command_rows if kind == "commands" else MOTION)
         problems += wrong
         if kind == "motion" and "motion" not in given:
             problems += _check_start(source, samples)
@@ -166,14 +172,14 @@ def _check_start(source: Source, samples: Samples | None) -> list[Problem]:
     return [source.problem(f"start.{key}", why, remedy, found=start[key]) for key in given]
 
 
-def _read_kind(source: Source, kind: str, given: Given) -> tuple[Samples | None, list[Problem]]:
+def _read_kind(source: Source, kind: str, given: Given, rows: Rows) -> tuple[Samples | None, list[Problem]]:
     """Return the samples of a section: from the file that replaces it, the file that it names, or itself."""
     if kind in given:
-        return read_csv(Path(given[kind]), str(given[kind]), kind)
-    values, problems = check_section(source, kind, source.table[kind])
+        return read_csv(Path(given[kind]), str(given[kind]), kind, rows)
+    values, problems = check_section(source, kind, source.table[kind], rows)
     asked = values.pop("interpolation", None)
     if "file" in values:
-        samples, wrong = read_csv(source.folder / values["file"], values["file"], kind)
+        samples, wrong = read_csv(source.folder / values["file"], values["file"], kind, rows)
     else:
         lists = {name: values[name] for name in values if values[name] is not None}
         samples, wrong = inline(source, kind, lists)
@@ -263,10 +269,20 @@ def _check_end(samples: Samples, duration: float) -> list[Problem]:
     return [samples.problem(len(samples.time) - 1, why, remedy)]
 
 
-def commands(samples: Samples) -> Commands:
-    """Return checked samples as commands: rev/s and radians."""
-    time, *values = (_inner(samples, quantity) for quantity in COMMANDS)
-    return Commands(time=time, values=np.ascontiguousarray(np.column_stack(values)))
+def commands(samples: Samples, listed: Rows = ()) -> Commands:
+    """Return checked samples as commands: rev/s, radians, and the units of listed actuators.
+
+    Args:
+        samples: of commands; a column that is left out is zero.
+        listed: columns of the listed actuators of the vehicle; of those that are given, the commands have one each.
+    """
+    given = [column for column in listed if column.name in samples.columns]
+    zeros = np.zeros(len(samples.time))
+    time, *values = (
+        _inner(samples, column) if column.name in samples.columns else zeros for column in (*COMMANDS, *given)
+    )
+    names = tuple(actuator_of(column) for column in given)
+    return Commands(time=time, values=np.ascontiguousarray(np.column_stack(values)), listed=names)
 
 
 def motion(samples: Samples) -> Motion:
@@ -298,28 +314,34 @@ def _inner(samples: Samples, quantity: Quantity) -> np.ndarray:
     return np.asarray(samples.columns[quantity.name], dtype=float) * quantity.scale
 
 
-def read_csv(path: Path, name: str, section: str) -> tuple[Samples | None, list[Problem]]:
+def read_csv(
+    path: Path, name: str, section: str, rows: Rows | None = None
+) -> tuple[Samples | None, list[Problem]]:
     """Read the samples of a section from a CSV file.
 
     Args:
         path: the file.
         name: the file as the user named it.
         section: ``commands`` or ``motion``.
+        rows: the columns that it may have; those of the section by default.
 
     Returns:
         the samples, None if there are no times to speak of; and the problems.
     """
-    name = printable(name)
+    name, wanted = printable(name), SECTIONS[section] if rows is None else rows
     try:
-        (line, given), rows = _table(read_text(path, name, MOST_OF_A_CSV), name)
+        (line, given), cells = _table(read_text(path, name, MOST_OF_A_CSV), name)
     except ScenarioError as error:
         return None, list(error.problems)
-    header = line, [WRITTEN[section].get(column, column) for column in given]
-    columns, problems = _columns(name, header[1], rows, SECTIONS[section])
-    problems += _header_problems(name, header, SECTIONS[section], BY_COLUMN)
-    problems += _shape_problems(name, header[1], rows)
+    listed = [row for row in wanted if row.name not in (fixed.name for fixed in SECTIONS[section])]
+    written = WRITTEN[section] | {written_column(row, "command"): row.name for row in listed}
+    header = line, [written.get(column, column) for column in given]
+    columns, problems = _columns(name, header[1], cells, wanted)
+    passed_over = [*BY_COLUMN, *(written_column(row, "state") for row in listed)]
+    problems += _header_problems(name, header, wanted, passed_over)
+    problems += _shape_problems(name, header[1], cells)
     problems.sort(key=lambda problem: problem.line or 0)
-    whole = _whole(header[1], rows)
+    whole = _whole(header[1], cells)
     time = columns.get("time_s", [])
     if not time or any(math.isnan(at) for at in time):
         return None, problems
@@ -377,7 +399,11 @@ def _header_problems(
         if column not in allowed and column in passed_over:
             continue
         if column not in allowed:
-            why, remedy = "there is no such column", nearest_or_all(column, allowed)
+            more = {row.name for row in COMMANDS} < set(allowed)
+            why, remedy = (
+                "there is no such column",
+                (nearest_and_all if more else nearest_or_all)(column, allowed),
+            )
         elif column in columns[:at]:
             why, remedy = "this column stands twice", "Keep one of the two."
         else:

@@ -7,12 +7,12 @@ in one does not hide those in another. Checks that compare several values live i
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
+from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
-from scenarios.errors import Problem, nearest_or_all
+from scenarios.errors import Problem, nearest_and_all, nearest_or_all
 from scenarios.files import Source
 from scenarios.quantities import CONTROLS, INTERPOLATIONS, SCHEMES, SECTIONS, Quantity
 
@@ -63,11 +63,15 @@ class MotionReference(FileReference):
     interpolation: Literal["linear", "smooth"] | None = None
 
 
-@cache
-def section_model(name: str) -> type[BaseModel]:
-    """Return the model of one section, made from its rows in the table of quantities."""
+MODELS_KEPT = 32
+"""Every section has one, and the commands of each of the last few vehicles with actuators of their own."""
+
+
+@lru_cache(maxsize=MODELS_KEPT)
+def section_model(name: str, quantities: tuple[Quantity, ...]) -> type[BaseModel]:
+    """Return the model of one section, made from the rows of its table of quantities."""
     fields: dict[str, Any] = {}
-    for quantity in SECTIONS[name]:
+    for quantity in quantities:
         kind: Any = Annotated[float, Field(ge=quantity.low, le=quantity.high)]
         default: Any = ... if quantity.default is None else quantity.default
         if quantity.many:
@@ -91,13 +95,16 @@ def check_page(source: Source) -> list[Problem]:
     return problems
 
 
-def check_section(source: Source, name: str, raw: object) -> tuple[dict[str, Any], list[Problem]]:
+def check_section(
+    source: Source, name: str, raw: object, rows: tuple[Quantity, ...] | None = None
+) -> tuple[dict[str, Any], list[Problem]]:
     """Check one section of a trial file.
 
     Args:
         source: the file, for the lines in messages.
         name: one of `SECTIONS`.
         raw: the contents of the file.
+        rows: the numbers that it may hold, if not those of `SECTIONS`.
 
     Returns:
         its values, in the units of the file, as far as they are good; and the problems.
@@ -107,8 +114,9 @@ def check_section(source: Source, name: str, raw: object) -> tuple[dict[str, Any
     if name in LISTS and "file" in raw:
         reference = MotionReference if name == "motion" else FileReference
         return _validate(reference, source, name, raw, {})
-    quantities = {quantity.name: quantity for quantity in SECTIONS[name]}
-    return _validate(section_model(name), source, name, raw, quantities)
+    rows = SECTIONS[name] if rows is None else rows
+    quantities = {quantity.name: quantity for quantity in rows}
+    return _validate(section_model(name, rows), source, name, raw, quantities)
 
 
 def _validate(
@@ -146,6 +154,8 @@ def _explain(
     """Return why a value is not possible, and the remedy."""
     where = f"[{section}]" if section else "a trial file"
     limits = quantities[name].allowed if name in quantities else ""
+    if kind == "extra_forbidden" and section == "commands" and len(allowed) > len(SECTIONS[section]):
+        return "the vehicle has no such command", nearest_and_all(name, allowed)
     if kind == "extra_forbidden":
         return f"{where} has no such key", nearest_or_all(name, allowed)
     if name in CHOICES:

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.checks import Checks
+from scenarios.command_columns import command_faults
 from scenarios.errors import Problem, ScenarioError
 from scenarios.instructions import REACH_THE_END, Commands, Motion, ends_early
 from scenarios.quantities import (
@@ -366,8 +367,13 @@ class Trial:
             check.say("motion", ends_early(self.duration), REACH_THE_END, float(self.motion.time[-1]))
         if self.motion is not None and self.start.at_trim:
             check.say("start", "a prescribed motion says how it starts", "Leave out at_trim.")
-        for name, found, why, remedy in misfits({n: getattr(self, n) for n in RUN_FIELDS} | vars(self.start)):
-            check.say(name, why, remedy, found)
+        for name, value, why, remedy in misfits({n: getattr(self, n) for n in RUN_FIELDS} | vars(self.start)):
+            check.say(name, why, remedy, value)
+        if self.commands is not None and self.commands.listed:
+            for key, found, why, remedy in command_faults(
+                self.commands.listed, self.commands.values, self.vehicle
+            ):
+                check.say(key, why, remedy, found)
         asked = [name for name in ("profile", "winch", "vessel", "grading") if getattr(self, name)]
         asked += [name for name in ONLY_DEFAULT_CABLE if self.cable.get(name, 0.0) > 0.0]
         if self.scheme != SCHEMES[0] and asked:

@@ -33,6 +33,8 @@ UNITS: dict[str, tuple[str, float]] = {
     "N": ("N", 1.0),
     "N m": ("N_m", 1.0),
     "J": ("J", 1.0),
+    "m3": ("m3", 1.0),
+    "1": ("", 1.0),
 }
 """Display unit → (suffix of the CSV column, display units per unit used inside: SI, but rev/s)."""
 
@@ -87,7 +89,7 @@ class Channel:
     @property
     def column(self) -> str:
         """Name of the CSV column, such as ``surge_speed_m_s``."""
-        return f"{COLUMN_STEMS.get(self.name, self.name)}_{self.suffix}"
+        return f"{COLUMN_STEMS.get(self.name, self.name)}_{self.suffix}".removesuffix("_")
 
     @property
     def attributes(self) -> dict[str, str]:
@@ -227,3 +229,55 @@ class Observation(NamedTuple):
 
 
 HEADING = "heading"
+
+LISTED = "listed_actuator"
+"""Attribute of a variable that is the state or the command of a listed actuator: the name of its command."""
+
+
+class Listed(Protocol):
+    """The command of a listed actuator, such as a `vehicle.channels.Channel`."""
+
+    @property
+    def name(self) -> str:
+        """Of the command."""
+
+    @property
+    def meaning(self) -> str:
+        """In words."""
+
+    @property
+    def unit(self) -> str:
+        """SI: 1, rad, m or m3."""
+
+
+def listed_channels(command: Listed) -> tuple[Channel, Channel]:
+    """Return the channels of the state and the command of a listed actuator: a fin's are angles in degrees."""
+    unit = {"rad": "degree"}.get(command.unit, command.unit)
+    symbol = rf"\mathrm{{{command.name.replace('_', '~')}}}"
+    return (
+        Channel(
+            name=f"{command.name}_state", unit=unit, symbol=symbol, long_name=f"{command.meaning}, lagged"
+        ),
+        Channel(
+            name=f"{command.name}_command",
+            unit=unit,
+            symbol=symbol,
+            long_name=f"{command.meaning}, commanded",
+        ),
+    )
+
+
+def channels_of(run: Any) -> tuple[Channel, ...]:
+    """Return the channels that a run has: those of the table, then those of the listed actuators of its vehicle.
+
+    Args:
+        run: a dataset or a `subzero.results.dataset.PlainRun`.
+    """
+    variables = run.variables
+    listed = [(str(name), values) for name, values in variables.items()]
+    own = [
+        Channel(name=name, unit=about["units"], symbol=about["symbol"], long_name=about["long_name"])
+        for name, values in listed
+        if LISTED in (about := values.attributes if hasattr(values, "attributes") else values.attrs)
+    ]
+    return (*(channel for channel in CHANNELS if channel.name in variables), *own)

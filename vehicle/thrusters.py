@@ -131,21 +131,25 @@ def add_thrusters(
         out[5] += x * Y - y * X + torque * c
 
 
-def allocation(thrusters: tuple[Thruster, ...]) -> np.ndarray:
+AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+
+
+def allocation(thrusters: tuple[Thruster, ...], axes: tuple[str, ...] = AXES) -> np.ndarray:
     """Return W B⁺ (thrusters, 6): thrusts of least Σ(T/T_max)² that make a wrench. [N/N, 1/m]
 
     B (6, thrusters) has the wrench per newton of each as columns, W = diag(T_max):
 
         T = W (B W)⁺ τ                                          (Fossen 2021, section 11.2.1, weighted pseudo-inverse)
 
-    Components of τ that no thruster makes are made as nearly as possible.
+    Components of τ that no thruster makes are made as nearly as possible; those along other than the given axes are
+    left to what comes of it.
     """
     B = np.column_stack([thruster.wrench for thruster in thrusters])
     W = np.diag([min(thruster.thrust_ahead, thruster.thrust_astern) for thruster in thrusters])
-    return np.asarray(W @ np.linalg.pinv(B @ W))
-
-
-AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+    made = np.zeros((len(thrusters), len(AXES)))
+    rows = [AXES.index(axis) for axis in axes]
+    made[:, rows] = W @ np.linalg.pinv(B[rows] @ W)
+    return made
 
 
 def unheld_axes(thrusters: tuple[Thruster, ...], axes: tuple[str, ...]) -> list[str]:

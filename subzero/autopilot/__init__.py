@@ -21,7 +21,7 @@ are through the water. Names come from their modules when they are first used: p
 symbol       name                                    unit        file
 -----------  --------------------------------------  ----------  ---------------------
 x, u         states and inputs of a plant            SI          hull_state_space
-F_c          force of the cable in steady motion     N           trim_point
+F_c          force of the cable in steady motion     N           steady_pull
 x₀, u₀       trim: steady state and its command      SI          trim_point
 A, B, C, D   linear model about it                   SI          linear, cable_modes
 A_k, B_k     linear model along a run                SI          along
@@ -55,7 +55,7 @@ _HOME = {
     "Margins": "subzero.autopilot.stability_margins",
     "Mode": "subzero.autopilot.linear",
     "NoCable": "subzero.autopilot.feed_forward",
-    "NoTrimError": "subzero.steady_motion.trim_point",
+    "NoTrimError": "subzero.steady_motion.asked",
     "PERFECT": "subzero.autopilot.sensors",
     "Pilot": "subzero.autopilot.steps",
     "STATES": "subzero.steady_motion.hull_state_space",
@@ -86,6 +86,7 @@ _HOME = {
     "reduced": "subzero.autopilot.design",
     "step": "subzero.autopilot.steps",
     "subsystem": "subzero.autopilot.linear",
+    "station_trim": "subzero.steady_motion.station_trim",
     "trim": "subzero.steady_motion.trim",
     "tune": "subzero.autopilot.tuning",
     "with_weights": "subzero.autopilot.design",

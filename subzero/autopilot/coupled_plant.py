@@ -111,7 +111,7 @@ class Tethered:
         capacity = int((longest + RUN_IN) / trial.segment_length) + SPARE + 4
         self._live = live._replace(line=enlarged(live.line, max(capacity, live.line.length.size)))
         self._memory = Memory(self._live)
-        self._recording = new_recording(2, 4 * self._live.line.length.size)
+        self._recording = new_recording(2, 4 * self._live.line.length.size, entries=self._live.state.size)
         self._r_c = model.vehicle.tow_point.position()
         self.sample_time, self._longest = trial.cable_step, longest
         x = from_vehicle(live.state, heading_near=trial.start.heading) if x is None else x

@@ -27,8 +27,17 @@ import numpy as np
 from subzero.autopilot.cable_modes import BENDS, CableModes
 from subzero.errors import UserError, suggestion
 from subzero.model import Model
-from subzero.steady_motion.hull_state_space import INPUT_NAMES, STATE_NAMES, VELOCITY, ideal, rate, to_vehicle
-from subzero.steady_motion.trim_point import SteadyPull, Trim
+from subzero.steady_motion.hull_state_space import (
+    STATE_NAMES,
+    VELOCITY,
+    ideal,
+    inputs_of,
+    rate,
+    states_of,
+    to_vehicle,
+)
+from subzero.steady_motion.steady_pull import SteadyPull
+from subzero.steady_motion.trim_point import Trim
 from vehicle import rotation
 from vehicle.rigid_body import skew
 
@@ -43,8 +52,6 @@ STEEPEST = 1e-3
 
 KEPT = STATE_NAMES[2:]
 """States of the linear model of a hull: all but north and east."""
-LENGTH = len(STATE_NAMES)
-"""Index of the cable's length, after the states of the hull."""
 
 
 class Subsystem(NamedTuple):
@@ -80,8 +87,10 @@ def linearise(model: Model, steady: Trim, *, cross_flow: float = 0.0) -> control
             smallest motions, a tenth of a degree. For a heading that swings by ε half of U ε is right. [m/s]
 
     Returns:
-        14 states (`STATES` without north and east), with a cable those of `cable_states` behind them; all are outputs
-        too. 4 inputs. All by name, in SI units, rad and rev/s (`UNITS`).
+        14 states (`STATES` without north and east) and one for each channel of the vehicle, ``front_port_state``, with
+        a cable those of `cable_states` behind them; all are outputs too. 4 inputs, and one for each channel,
+        ``front_port_command``. All by name, in SI units, rad and rev/s (`UNITS`). A thruster whose thrust grows with
+        the square of its command and that stands still has no gain.
 
     Raises:
         UserError: a cable that does not lie straight, or that a winch turns or a vessel carries on: what to do.
@@ -90,18 +99,19 @@ def linearise(model: Model, steady: Trim, *, cross_flow: float = 0.0) -> control
 
     if not (np.isfinite(cross_flow) and cross_flow >= 0.0):
         raise UserError(f"linearise: the cross_flow is {cross_flow!r}. Allowed: a speed of at least 0 m/s.")
-    names = list(KEPT)
+    states, inputs = ([each.name for each in of(model.vehicle)] for of in (states_of, inputs_of))
+    names = states[2:]
     if steady.wet_length > 0.0:
         _check_straight(model, steady)
         names += cable_states()
         f, at = _tethered_rate(model, steady, cross_flow), np.zeros(2 + len(names))
-        at[: len(STATE_NAMES)], at[LENGTH] = steady.state, steady.wet_length
+        at[: len(states)], at[len(states)] = steady.state, steady.wet_length
     else:
         f, at = _hull_rate(model, steady), steady.state
     A = _slopes(lambda x: f(x, steady.command_angles), at)[2:, 2:]
     B = _slopes(lambda u: f(at, u), steady.command_angles)[2:]
-    D = np.zeros((len(names), len(INPUT_NAMES)))
-    labels = {"states": names, "outputs": names, "inputs": list(INPUT_NAMES)}
+    D = np.zeros((len(names), len(inputs)))
+    labels = {"states": names, "outputs": names, "inputs": inputs}
     return control.ss(A, B, np.eye(len(names)), D, name="hull", **labels)
 
 
@@ -125,7 +135,7 @@ def _check_straight(model: Model, steady: Trim) -> None:
     freely.
     """
     cable = model.cable
-    angle = (abs(cable.weight_in_water) / max(cable.normal_drag, 1e-12)) ** 0.5 / steady.speed
+    angle = (abs(cable.weight_in_water) / max(cable.normal_drag, 1e-12)) ** 0.5 / max(steady.speed, 1e-12)
     wrong = (
         (steady.turn_rate != 0.0, "the vehicle turns, and the cable with it"),
         (model.winch is not None, "a winch turns the drum"),
@@ -165,15 +175,15 @@ def _tethered_rate(model: Model, steady: Trim, cross_flow: float) -> Rate:
     speed = float(np.linalg.norm(lever @ steady.state[VELOCITY]))
     side = CableModes.of(model, speed, steady.wet_length, cross_flow=cross_flow)
     mass = np.diag([pull.mass, -side.H[1], -side.H[1]])
-    drag = pull.drag / steady.wet_length
+    drag, length = pull.drag / steady.wet_length, steady.state.size
 
     def f(x: np.ndarray, u: np.ndarray) -> np.ndarray:
-        nu, z = x[VELOCITY], x[LENGTH + 1 :].reshape(2, -1)
-        turned = way @ _rotation(x[: len(STATE_NAMES)])
+        nu, z = x[VELOCITY], x[length + 1 :].reshape(2, -1)
+        turned = way @ _rotation(x[:length])
         V, a = turned @ lever @ nu, turned @ np.cross(nu[3:], lever @ nu)
-        ahead = -(drag * x[LENGTH] * V[0] ** 2 + pull.friction)
+        ahead = -(drag * x[length] * V[0] ** 2 + pull.friction)
         F = np.array([ahead, *(z @ side.G + side.H[0] * V[1:])]) - mass @ a
-        rates = rate(x[: len(STATE_NAMES)], u, hull, lever.T @ turned.T @ F + extra)
+        rates = rate(x[:length], u, hull, lever.T @ turned.T @ F + extra)
         heavier = hull.mass_matrix + lever.T @ turned.T @ mass @ turned @ lever
         rates[VELOCITY] = np.linalg.solve(heavier, hull.mass_matrix @ rates[VELOCITY])
         a += turned @ lever @ rates[VELOCITY]
@@ -194,7 +204,7 @@ def _way(model: Model, steady: Trim) -> np.ndarray:
 
 
 def _rotation(x: np.ndarray) -> np.ndarray:
-    """Return R_nb (3, 3) of a state (16,)."""
+    """Return R_nb (3, 3) of a state (16 and more,)."""
     R = np.empty((3, 3))
     rotation(to_vehicle(x)[3:7], R)
     return R
@@ -228,7 +238,7 @@ def subsystem(linear: control.StateSpace, name: str) -> control.StateSpace:
     labels = tuple(linear.state_labels)
     own = (*part.states, *(label for label in labels if part.cable and label.startswith(part.cable)))
     to_x = _rows(labels, "stern_plane_port_angle", ("stern_planes_angle", "stern_planes_difference"))
-    to_u = _rows(INPUT_NAMES, "stern_plane_port_command", SUBSYSTEM_COMMANDS)
+    to_u = _rows(tuple(linear.input_labels), "stern_plane_port_command", SUBSYSTEM_COMMANDS)
     rows = np.array([to_x[state] for state in own])
     states = np.column_stack([_spread(row) for row in rows])
     inputs = np.column_stack([_spread(to_u[each]) for each in part.inputs])

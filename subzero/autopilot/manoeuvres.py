@@ -24,9 +24,10 @@ from subzero.channels import Observation
 from subzero.errors import UserError, checked, chosen
 from subzero.model import Model, load, model_of
 from subzero.simulation.run import Progress
+from subzero.steady_motion.asked import NoTrimError
 from subzero.steady_motion.hull_state_space import INPUT_NAMES
 from subzero.steady_motion.trim import trim
-from subzero.steady_motion.trim_point import NoTrimError, held_speeds
+from subzero.steady_motion.trim_point import held_speeds
 
 if TYPE_CHECKING:
     import xarray as xr

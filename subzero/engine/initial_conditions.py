@@ -49,11 +49,12 @@ from subzero.engine.recording import new_recording, record_row
 from subzero.engine.run_state import LINEAR_ROWS, Fixed, HullWork, Ledger, Live, Now, Orders, Setup
 from subzero.engine.station_keeping import INTEGRALS, station_of
 from subzero.engine.vehicle_step import pose
-from subzero.errors import UserError, printable
+from subzero.errors import UserError, printable, short, suggestion
 from subzero.external_force import MissingForce
 from subzero.jit import Call, allocating, compile_in_parallel, compiled, made_once
 from subzero.model import Model
 from vehicle import POWERS, Vehicle, initial_state, kinetic_energy, rotation
+from vehicle.channels import FIRST_COMMAND
 from vehicle.state import LINKAGE, POSITION, SERVO, VELOCITY
 
 FORCE_TOLERANCE = 1e-9
@@ -185,7 +186,7 @@ def setup_of(trial: scenarios.Trial, model: Model, tethered: bool) -> Setup:
     added, terms = (model.missing or NOTHING).numbers()
     return Setup(
         fixed=_fixed(trial, model, tethered, bool(added.size or terms.size)),
-        orders=_orders(trial, len(model.vehicle.channels)),
+        orders=_orders(trial, model.vehicle),
         track=_track(trial),
         water=model.water().numbers(),
         led=drum_direction(trial, model, _wet_length(trial)),
@@ -296,14 +297,28 @@ def _as_joint(cable: CableProperties, vehicle: Vehicle, length: float) -> CableP
     return replace(cable, compliance=compliance, internal_damping=damping)
 
 
-def _orders(trial: scenarios.Trial, channels: int) -> Orders:
-    """Return the commands, none for a prescribed motion; those of channels are zero, or written by station keeping."""
-    if trial.commands is None or trial.station is not None:
-        return Orders(np.zeros(1), np.zeros((1, 4 + channels)))
-    values = np.array(trial.commands.values, dtype=float)
-    if channels:
-        values = np.concatenate([values, np.zeros((values.shape[0], channels))], axis=1)
-    return Orders(np.array(trial.commands.time, dtype=float), values)
+def _orders(trial: scenarios.Trial, vehicle: Vehicle) -> Orders:
+    """Return the commands, none for a prescribed motion; those of channels by name, zero for one that is not commanded,
+    or written by station keeping.
+
+    Raises:
+        UserError: a command to an actuator that the vehicle does not have.
+    """
+    given, names = trial.commands, [channel.name for channel in vehicle.channels]
+    if given is None or trial.station is not None:
+        return Orders(np.zeros(1), np.zeros((1, FIRST_COMMAND + len(names))))
+    unknown = [name for name in given.listed if name not in names]
+    if unknown:
+        has = f"It has {', '.join(names)}." if names else "It has none."
+        raise UserError(
+            f"'{trial.name}' commands {short(unknown[0])}, and this vehicle has no such actuator."
+            f"{suggestion(unknown[0], names)} {has}"
+        )
+    values = np.zeros((given.time.size, FIRST_COMMAND + len(names)))
+    values[:, :FIRST_COMMAND] = given.values[:, :FIRST_COMMAND]
+    for name, column in zip(given.listed, given.values.T[FIRST_COMMAND:], strict=True):
+        values[:, FIRST_COMMAND + names.index(name)] = column
+    return Orders(np.array(given.time, dtype=float), values)
 
 
 def _track(trial: scenarios.Trial) -> np.ndarray:
@@ -395,8 +410,9 @@ def _check_fins(start: scenarios.Start, model: Model) -> None:
 
 def _steady(trial: scenarios.Trial, model: Model, tethered: bool) -> np.ndarray:
     """Return the state of a trial that starts in trim."""
+    from subzero.steady_motion.asked import Asked
     from subzero.steady_motion.hull_state_space import to_vehicle
-    from subzero.steady_motion.trim_point import Asked, steady_motion
+    from subzero.steady_motion.trim_point import steady_motion
 
     start, water = trial.start, _water_at_the_start(model, trial.start.depth)
     wet, speed, R = start.wet_length if tethered else 0.0, start.surge_speed, np.empty((3, 3))

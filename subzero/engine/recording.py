@@ -19,6 +19,7 @@ from subzero.engine.run_state import IMPULSE, OVERLOAD, PEAK, Live, Now, Setup
 from subzero.engine.station_keeping import steer
 from subzero.jit import compiled
 from vehicle import BREAKDOWN, STATE_SIZE, battery_voltage, breakdown, deflections, euler_angles
+from vehicle.channels import FIRST_COMMAND
 
 BREATH_S = 0.1
 """Compiled code computes for about so long before Python moves the progress bar and handles an interrupt. [s]"""
@@ -41,7 +42,7 @@ class Recording(NamedTuple):
         attitude: roll, pitch, heading (n, 3). [rad]
         rotation: R_nb (n, 3, 3).
         fins: rudder, port and starboard plane in the water (n, 3). [rad]
-        command: (n, 4). [rev/s, rad]
+        command: (n, 4 and one for each channel). [rev/s, rad; units of the channels]
         voltage: of the battery (n,). [V]
         tow_force: pull of the cable, earth axes (n, 3). [N]
         wrench: the same on the hull, body axes, with its moment (n, 6). [N, N m]
@@ -188,7 +189,7 @@ def new_recording(rows: int, nodes: int, times: int = 0, entries: int = STATE_SI
         "attitude": (rows, 3),
         "rotation": (rows, 3, 3),
         "fins": (rows, 3),
-        "command": (rows, 4),
+        "command": (rows, FIRST_COMMAND + entries - STATE_SIZE),
         "tow_force": (rows, 3),
         "wrench": (rows, 6),
         "breakdown": (rows, len(BREAKDOWN), 6),
@@ -211,7 +212,7 @@ def record_row(setup: Setup, live: Live, recording: Recording, row: int, time: f
     tow_wrench(state, live.now.force, setup.fixed.r_c, live.now.hull)  # fills hull.rotation, too
     for i in range(state.size):
         r.state[row, i] = state[i]
-    for i in range(4):
+    for i in range(min(command.size, r.command.shape[1])):
         r.command[row, i] = command[i]
     angles = euler_angles(state[3:7])
     for i in range(3):

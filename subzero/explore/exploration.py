@@ -20,6 +20,7 @@ from time import perf_counter
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from scenarios import ScenarioError, Trial, load
+from scenarios.command_columns import actuator_of, listed_columns
 from scenarios.parameters import (
     ELEMENT,
     PARTS,
@@ -135,12 +136,16 @@ class Slider:
 
 
 def sliders_of(trial: Trial) -> tuple[Slider, ...]:
-    """Return the sliders that a trial has, in the order of `ROWS`.
+    """Return the sliders that a trial has: listed actuators that it commands, then in the order of `ROWS`.
 
     Lists that stand in a CSV file have none, and so has a value of 0 for which no file says how far it may go.
     """
     known, ranges = parameter_names(trial), declared_ranges(trial)
     rows = [[cell.strip() for cell in line.split("|")] for line in ROWS.strip().splitlines()]
+    rows[:0] = [
+        [f"commands.{row.name}", actuator_of(row).replace("_", " "), str(row.low), str(row.high)]
+        for row in listed_columns(trial.vehicle)
+    ]
     found = (
         _slider(trial, names.split(), words, (low, high), ranges)
         for names, words, low, high in rows

@@ -9,13 +9,14 @@ Inside `page_width` they are as narrow as a column of a page.
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 from subzero.arguments import check_is_run, checked_arguments
 from subzero.errors import BadValueError
 from subzero.figures.cable import deployment, is_deployed, shape, tension
 from subzero.figures.forces import forces
-from subzero.figures.motion import attitude, figure_6, measured, station
+from subzero.figures.motion import actuators, attitude, figure_6, measured, station
 from subzero.figures.prescribed import exact_tension, figure_4, figure_5, is_straight
 from subzero.figures.style import Runs, Title, page_width, warnings_in_short
 
@@ -72,13 +73,18 @@ def draw(runs: Runs | xr.Dataset, record: Record | None = None) -> dict[str, Fig
 
 def _commanded(runs: Runs, record: Record | None, title: Title) -> dict[str, Figure]:
     """Return the figures of a vehicle that follows commands."""
-    if "thruster_command" in next(iter(runs.values())):
-        figures = {"station": station(runs, record, title)}
-    else:
-        figures = {"fig6": figure_6(runs, record, title), "attitude": attitude(runs, record, title)}
+    run = next(iter(runs.values()))
+    has_propeller = json.loads(run.attrs["parameters"])["vehicle"]["propeller"]["thrust_constant"] > 0.0
+    figures: dict[str, Figure] = {}
+    if has_propeller:
+        figures |= {"fig6": figure_6(runs, record, title), "attitude": attitude(runs, record, title)}
+    if "thruster_command" in run or not has_propeller:
+        figures["station"] = station(runs, record, title)
+    if drawn := actuators(runs, title):
+        figures["actuators"] = drawn
     if "tethered" in runs:
         figures |= _cable(runs["tethered"], title)
-    figures["forces"] = forces(runs.get("tethered", next(iter(runs.values()))), title)
+    figures["forces"] = forces(runs.get("tethered", run), title)
     return figures
 
 

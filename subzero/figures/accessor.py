@@ -23,7 +23,7 @@ import xarray as xr
 
 from cable.memory import fits
 from subzero.arguments import check_is_run, checked_arguments
-from subzero.channels import BY_NAME, RENAMED_CHANNELS, TIME
+from subzero.channels import BY_NAME, RENAMED_CHANNELS, TIME, channels_of
 from subzero.errors import UserError, chosen, printable, short, suggestion
 from subzero.files.integrity import COPIES, DamagedError, check_arrays, check_digest, claimed_bytes
 from subzero.files.read_file import UnreadableFileError, check_readable
@@ -260,7 +260,7 @@ class RunPlots:
         """
         from subzero.figures.style import channel_panel, headline, sheet, time_label
 
-        channel = chosen({key: row for key, row in BY_NAME.items() if key in self._run}, name, "channel")
+        channel = chosen({row.name: row for row in channels_of(self._run)}, name, "channel")
         label = "tethered" if self._run.attrs["tethered"] else "untethered"
         figure, panels = sheet(1, 1, self._title())
         channel_panel(panels[0], {label: self._run}, name)
@@ -287,10 +287,10 @@ def figures_of(run: xr.Dataset, what: Sequence[str] | None = None) -> dict[str, 
     Raises:
         UserError: neither a figure nor a channel of this name.
     """
-    plots = RunPlots(run)
+    plots, channels = RunPlots(run), [channel.name for channel in channels_of(run)]
     for name in what or ():
-        if name not in PLOTS and (name not in BY_NAME or name not in run):
-            hint = suggestion(name, (*PLOTS, *BY_NAME))
+        if name not in PLOTS and name not in channels:
+            hint = suggestion(name, (*PLOTS, *channels))
             raise UserError(
                 f"There is no figure and no channel {short(name)}.{hint} Figures: {', '.join(PLOTS)}; or a channel of "
                 "the run, such as heading, depth, cable_tension."

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from subzero.channels import BY_NAME
+from subzero.channels import BY_NAME, LISTED
 from subzero.figures import style
 from subzero.figures.style import (
     Runs,
@@ -88,21 +88,55 @@ STATION = {
 
 
 def station(runs: Runs, record: Record | None, title: Title) -> Figure:
-    """Draw a vehicle of thrusters: its place, heading and pitch, and the commands of its thrusters, of one run."""
+    """Draw place, heading and pitch; and the commands of the thrusters of one run, or the roll where there are none."""
     figure, panels = sheet(3, 2, title)
-    for axes, (name, words) in zip(panels[:5], STATION.items(), strict=True):
+    has_thrusters = "thruster_command" in next(iter(runs.values()))
+    shown = STATION if has_thrusters else STATION | {"roll_angle": ATTITUDE["roll_angle"]}
+    for axes, (name, words) in zip(panels, shown.items(), strict=False):
         channel_panel(axes, runs, name, record)
         headline(axes, words)
     panels[2].invert_yaxis()
-    which, run = next(iter(runs.items()))
-    for name, command in zip(run["thruster"].values, run["thruster_command"].values.T, strict=True):
-        panels[5].plot(run["time"].values, command, linewidth=0.8, label=str(name).replace("_", " "))
-    label(panels[5], None, "share of full command [-]")
-    headline(panels[5], f"Thrusters, {which}")
-    in_time(panels[5], runs)
-    legend(panels[5], columns=2)
+    if has_thrusters:
+        _thrusters(panels[5], runs)
     legend(panels[0])
     time_label(panels, 2)
+    return figure
+
+
+def _thrusters(axes: Axes, runs: Runs) -> None:
+    """Draw the commands of the thrusters of the first run."""
+    which, run = next(iter(runs.items()))
+    for name, command in zip(run["thruster"].values, run["thruster_command"].values.T, strict=True):
+        axes.plot(run["time"].values, command, linewidth=0.8, label=str(name).replace("_", " "))
+    label(axes, None, "share of full command [-]")
+    headline(axes, f"Thrusters, {which}")
+    in_time(axes, runs)
+    legend(axes, columns=2)
+
+
+def actuators(runs: Runs, title: Title) -> Figure | None:
+    """Draw fins, moving masses and buoyancy engines of a list, a panel each, of one run; None for a vehicle without."""
+    which, run = next(iter(runs.items()))
+    thrusters = set(run["thruster"].values.tolist()) if "thruster" in run.coords else set()
+    names = {str(each.attrs[LISTED]): None for each in run.variables.values() if LISTED in each.attrs}
+    shown = [name for name in names if name not in thrusters]
+    if not shown:
+        return None
+    figure, panels = sheet((len(shown) + 1) // 2, 2, title)
+    for axes, name in zip(panels, shown, strict=False):
+        channel_panel(axes, {which: run}, f"{name}_state")
+        axes.step(
+            run["time"].values,
+            run[f"{name}_command"].values,
+            where="post",
+            label="commanded",
+            **style.COMMAND,
+        )
+        headline(axes, name.replace("_", " ").capitalize())
+    for axes in panels[len(shown) :]:
+        axes.remove()
+    legend(panels[0])
+    time_label(panels[: len(shown)], 2)
     return figure
 
 

@@ -25,7 +25,7 @@ from matplotlib.figure import Figure
 from matplotlib.textpath import TextPath
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator, StrMethodFormatter
 
-from subzero.channels import BY_NAME
+from subzero.channels import channels_of
 from subzero.errors import UserError
 from subzero.validity import warnings_of
 
@@ -292,14 +292,15 @@ def _wide(label: str, size: float) -> float:
 
 def channel_panel(axes: Axes, runs: Runs, name: str, record: Record | None = None) -> None:
     """Draw one channel of all runs over time, and its measurements."""
-    channel = BY_NAME[name]
+    channel = next(each for each in channels_of(next(iter(runs.values()))) if each.name == name)
     for run_name, run in runs.items():
         axes.plot(run["time"].values, run[name].values, label=run_name, **LINES[run_name])
     if record is not None and name in record.values:
         axes.plot(record.time, record.values[name], label="measured", zorder=1.5, **DOTS)
     label(axes, None, f"${channel.symbol}$ [{channel.unit}]")
+    axes.ticklabel_format(axis="y", scilimits=(-3, 5), useMathText=True)
     in_time(axes, runs)
-    calm(axes, smallest=1e-3)
+    calm(axes, smallest=1e-6 if channel.unit == "m3" else 1e-3)
 
 
 def in_time(axes: Axes, runs: Runs) -> None:

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from subzero.channels import BY_NAME, CHANNELS
+from subzero.channels import BY_NAME, channels_of
 from subzero.results.dataset import cable_origin
 
 if TYPE_CHECKING:
@@ -77,14 +77,13 @@ def encode(actors: tuple[Actor, ...], record: Record | None = None) -> dict[str,
     first = actors[0].run
     parameters = json.loads(first.attrs["parameters"])
     return {
-        "vehicle": {name: parameters["vehicle"][name] for name in HULL},
+        "vehicle": {name: parameters["vehicle"][name] for name in HULL}
+        | {"thrusters": parameters["vehicle"].get("thrusters", {})},
         "drum_radius": parameters["drum"]["radius"],
         "drum_on_vessel": parameters.get("vessel") is not None,
         "sea_bed": float(first.attrs.get("sea_bed_m", 0.0)) or None,
         "channels": {
-            channel.name: {"unit": channel.unit, "words": channel.long_name}
-            for channel in CHANNELS
-            if channel.name in first
+            channel.name: {"unit": channel.unit, "words": channel.long_name} for channel in channels_of(first)
         },
         "actors": [_actor(actor) for actor in actors],
         "measured": None if record is None else _measured(record),
@@ -95,9 +94,7 @@ def _actor(actor: Actor) -> dict[str, Any]:
     """Return the motion of one vehicle."""
     run = actor.run
     kept = _spread(run.sizes["time"], MOST_SAMPLES)
-    channels = {
-        channel.name: pack(run[channel.name].values[kept]) for channel in CHANNELS if channel.name in run
-    }
+    channels = {channel.name: pack(run[channel.name].values[kept]) for channel in channels_of(run)}
     return {
         "name": actor.name,
         "ghost": actor.ghost,

@@ -18,11 +18,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 import scenarios
-from subzero.channels import BY_NAME, CHANNELS, TIME
+from subzero.channels import BY_NAME, CHANNELS, LISTED, TIME, listed_channels
 from subzero.errors import DISTRIBUTION, printable
 from subzero.model import Model
 from subzero.validity import as_json, check_run
 from vehicle import BREAKDOWN, STATE_SIZE
+from vehicle.channels import FIRST_COMMAND
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -114,6 +115,7 @@ def plain_run(
         channel.name: Variable("time", values[channel.name] * channel.scale, channel.attributes)
         for channel in CHANNELS
     }
+    channels |= _listed(run, model)
     result = PlainRun(
         variables=channels | _arrays(run, spends) | diagnostics | _thrusters(run, model),
         coordinates={TIME.name: Variable("time", run.times, TIME.attributes)}
@@ -123,6 +125,17 @@ def plain_run(
     )
     record_accuracy(result, trial, model, accuracy)
     return result
+
+
+def _listed(run: Run, model: Model) -> dict[str, Variable]:
+    """Return state and command of each listed actuator of the vehicle."""
+    found = {}
+    for i, command in enumerate(model.vehicle.channels):
+        columns = run.recording.state[:, STATE_SIZE + i], run.recording.command[:, FIRST_COMMAND + i]
+        for channel, values in zip(listed_channels(command), columns, strict=True):
+            about = channel.attributes | {LISTED: command.name}
+            found[channel.name] = Variable("time", values * channel.scale, about)
+    return found
 
 
 def _thrusters(run: Run, model: Model) -> dict[str, Variable]:

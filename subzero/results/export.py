@@ -24,7 +24,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from subzero.arguments import check_is_run, checked_arguments
-from subzero.channels import CHANNELS, TIME
+from subzero.channels import TIME, channels_of
 from subzero.errors import UserError, chosen, missing_extra, printable
 from subzero.files.atomic_output import friendly_errors
 from subzero.results.dataset import cable_origin
@@ -107,8 +107,7 @@ def _topics(run: xr.Dataset) -> dict[str, tuple[str, dict[str, Any]]]:
     """Return topic → name and JSON schema of its messages."""
     channels = {
         channel.column: {"type": "number", "description": f"{channel.long_name} [{channel.unit}]"}
-        for channel in CHANNELS
-        if channel.name in run
+        for channel in channels_of(run)
     }
     origin = np.zeros((1, 3))
     scene = _scene(0, "", "", cylinders=[_hull(run)], lines=[_line(origin)])
@@ -138,9 +137,7 @@ def _messages(run: xr.Dataset) -> Iterator[tuple[int, str, dict[str, Any]]]:
     times = np.rint(1e9 * run["time"].values).astype(np.int64).tolist()
     yield times[0], "/tf", _transform(times[0], "map", "ned", np.zeros(3), UP_AND_EAST)
     yield times[0], "/scene", _scene(times[0], "vehicle", "vehicle", cylinders=[_hull(run)])
-    columns = {
-        channel.column: run[channel.name].values.tolist() for channel in CHANNELS if channel.name in run
-    }
+    columns = {channel.column: run[channel.name].values.tolist() for channel in channels_of(run)}
     place, turn = _poses(run)
     shapes = _shapes(run)
     for row, at in enumerate(times):
@@ -281,8 +278,7 @@ def write_parquet(run: xr.Dataset, path: Path) -> None:
 
     columns = [
         (channel.column, pa.array(run[channel.name].values), channel.attributes)
-        for channel in (TIME, *CHANNELS)
-        if channel.name in run
+        for channel in (TIME, *channels_of(run))
     ]
     columns += [
         (name, pa.array(lists, pa.list_(pa.float64())), {"units": unit}) for name, unit, lists in _lists(run)

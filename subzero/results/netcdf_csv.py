@@ -12,7 +12,7 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
-from subzero.channels import CHANNELS, TIME
+from subzero.channels import TIME, channels_of
 from subzero.files import atomic_output
 from subzero.files.atomic_output import OutputFolder
 from subzero.files.integrity import append_digest
@@ -31,6 +31,8 @@ RUN_FILES = (
             "fig5",
             "fig6",
             "attitude",
+            "station",
+            "actuators",
             "cable",
             "tension",
             "forces",
@@ -181,7 +183,7 @@ def _located(run: xr.Dataset, name: str) -> dict[str, str]:
 
 def write_csv(run: xr.Dataset, path: Path) -> None:
     """Write the channels of a run as CSV: one row a sample, units in the column names, nothing where NaN."""
-    channels = [TIME, *(channel for channel in CHANNELS if channel.name in run)]
+    channels = [TIME, *channels_of(run)]
     columns = [run[channel.name].values for channel in channels]
     with open(path, "w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from subzero.channels import BY_NAME, AnyRun
+from subzero.channels import BY_NAME, AnyRun, channels_of
 from subzero.records.record import Fit, fits
 from subzero.validity import warnings_of
 
@@ -51,10 +51,21 @@ def summarise(run: AnyRun) -> dict[str, Any]:
         "largest_cable_moment_N_m": number(moment[twist]),
         "time_of_largest_cable_moment_s": number(time[twist]),
         **({"snap": json.loads(run.attrs["snap"])} if "snap" in run.attrs else {}),
+        **({"listed_actuators": moved} if (moved := moved_actuators(run)) else {}),
         "energy": energy_balance(run),
         "diagnostics": diagnostics(run),
         "thinned": run.attrs.get("thinned"),
         "refinement": json.loads(run.attrs["refinement"]) if "refinement" in run.attrs else None,
+    }
+
+
+def moved_actuators(run: AnyRun) -> dict[str, list[float | None]]:
+    """Return how far each listed actuator of the vehicle went: column of its state → least and largest value."""
+    listed = [channel for channel in channels_of(run) if channel.name not in BY_NAME]
+    states = [channel for channel in listed if channel.name.endswith("_state")]
+    return {
+        channel.column: [number(run[channel.name].values.min()), number(run[channel.name].values.max())]
+        for channel in states
     }
 
 

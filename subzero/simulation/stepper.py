@@ -9,13 +9,20 @@
     >>> run["rudder_command"].attrs["units"]
     'degree'
 
+A vehicle with listed actuators, such as thrusters, takes their commands behind the four, or by name:
+
+    >>> from dataclasses import replace
+    >>> rov = subzero.Simulator(replace(subzero.load_scenario("rov_hover"), station=None))
+    >>> rov.step({"front_port": 0.2, "aft_port": 0.2}).time
+    0.1
+
 Each step holds a command for one sample time. The exchanges of hull and cable inside are those of `subzero.simulate`:
 the same commands give the same numbers, to the last bit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import isfinite, pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -23,7 +30,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 import scenarios
-from scenarios.steps import whole_steps
+from scenarios.steps import held, whole_steps
 from subzero.arguments import checked_arguments
 from subzero.channels import Observation
 from subzero.engine import coupling
@@ -31,16 +38,20 @@ from subzero.engine.initial_conditions import prepare
 from subzero.engine.recording import Recording, Run, cut, new_recording, record_row
 from subzero.engine.run_state import Live, Orders, Setup
 from subzero.engine.time_loop import ENDING, NO_ROOM, ROW, USED, advance, hold, observe
-from subzero.errors import UserError, real, short
+from subzero.errors import UserError, real, short, suggestion
 from subzero.model import Model, load, model_of
 from subzero.simulation.run import WENT_WELL, enlarged_run, in_words
+from vehicle.channels import FIRST_COMMAND
 
 if TYPE_CHECKING:
     import xarray as xr
 
-Command = Sequence[float] | np.ndarray
-"""Propeller [rev/s], rudder, port and starboard stern-plane [rad]."""
+Command = Sequence[float] | np.ndarray | Mapping[str, float]
+"""Propeller [rev/s], rudder, port and starboard stern-plane [rad], and, if any of them is given, one number for each of
+the vehicle's `channels`; or numbers by name, those of `FOUR` and of the channels, the others zero.
+"""
 
+FOUR = ("propeller", "rudder", "stern_plane_port", "stern_plane_starboard")
 COMMANDED = ("propeller [rev/s]", "rudder [rad]", "port stern-plane [rad]", "starboard stern-plane [rad]")
 
 
@@ -79,7 +90,7 @@ class Held(NamedTuple):
 
 
 class CommandError(UserError, ValueError):
-    """A command that is not four finite numbers; the run does not advance."""
+    """A command that is not finite numbers, four or one for each actuator; the run does not advance."""
 
 
 class RunStoppedError(UserError):
@@ -119,6 +130,7 @@ class Simulator:
         self.trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
         self.model = model_of(self.trial, model)
         self._tethered = bool(tethered)
+        self._channels = tuple(channel.name for channel in self.model.vehicle.channels)
         self._exchanges = _exchanges(self.trial, sample_time, self._tethered)
         self.sample_time = self._exchanges * self.trial.cable_step
         self.reset()
@@ -126,8 +138,9 @@ class Simulator:
     def reset(self) -> Observation:
         """Return to the start; return the observation there."""
         setup, live = prepare(self.trial, self.model, self._tethered)
+        self._orders = setup.orders
         setup = setup._replace(orders=Orders(np.zeros(1), np.zeros((1, setup.orders.values.shape[1]))))
-        setup.orders.values[0, :4] = self._command_at(0.0)
+        setup.orders.values[0] = self._command_at(0.0)
         times = _times(self.trial)
         nodes = 4 * times.size * live.line.length.size if self._tethered else 0
         recording = new_recording(times.size, nodes, entries=live.state.size)
@@ -158,14 +171,20 @@ class Simulator:
         """Hold a command for one sample time; return the observation after it.
 
         Args:
-            command: propeller [rev/s], rudder, port and starboard stern-plane [rad]; None: what the scenario commands
-                at this time.
+            command: propeller [rev/s], rudder, port and starboard stern-plane [rad], then the `channels` of the vehicle
+                in their units, or zero for all of them; or all by name; None: what the scenario commands at this time.
 
         Raises:
-            CommandError: the command is not four finite numbers (a UserError); the run stands where it was.
+            CommandError: the command is not finite numbers, or not of this vehicle (a UserError); the run stands where
+                it was.
             RunStoppedError: the simulation cannot go on.
         """
-        self.hold(*(self._command_at(self.time) if command is None else self._checked(command)))
+        n, rudder, port, starboard, *listed = (
+            self._command_at(self.time) if command is None else self._checked(command)
+        )
+        if self._channels:
+            self._held.setup.orders.values[0, FIRST_COMMAND:] = listed or 0.0
+        self.hold(n, rudder, port, starboard)
         return self.observation
 
     def hold(self, n: float, rudder: float, port: float, starboard: float) -> None:
@@ -201,26 +220,44 @@ class Simulator:
         )
         return plain_run(self.trial, self.model, self._tethered, run).labelled()
 
-    def _checked(self, command: Command) -> tuple[float, float, float, float]:
-        """Return a command as four floats."""
+    def _checked(self, command: Command) -> list[float]:
+        """Return a command as floats: four, and one for each channel if any of them is given."""
+        given = self._by_name(command) if isinstance(command, Mapping) else command
         try:
-            n, rudder, port, starboard = (float(value + 0.0) for value in command)  # no text is a number
-            if isfinite(n) and isfinite(rudder) and isfinite(port) and isfinite(starboard):
-                return n, rudder, port, starboard
+            numbers = [float(value + 0.0) for value in given]  # no text is a number
         except (TypeError, ValueError, OverflowError):
-            pass
+            numbers = []
+        if len(numbers) in (len(FOUR), len(FOUR) + len(self._channels)) and all(map(isfinite, numbers)):
+            self._check_station(numbers)
+            return numbers
+        listed = f"; or these and those of {', '.join(self._channels)}" if self._channels else ""
         raise CommandError(
             f"At t = {self.time:g} s the command is {short(command)}. Allowed: four finite numbers,"
-            f" {', '.join(COMMANDED)}."
+            f" {', '.join(COMMANDED)}{listed}."
         )
 
-    def _command_at(self, time: float) -> tuple[float, float, float, float]:
+    def _by_name(self, command: Mapping[str, float]) -> list[float]:
+        """Return a command that is given by name as numbers in their order."""
+        known = (*FOUR, *self._channels)
+        for name in command:
+            if name not in known:
+                raise CommandError(
+                    f"At t = {self.time:g} s the command names {short(name)}, and this vehicle has no such actuator."
+                    f"{suggestion(str(name), known)} It has {', '.join(known)}."
+                )
+        return [command.get(name, 0.0) for name in known]
+
+    def _check_station(self, numbers: Sequence[float]) -> None:
+        """Raise an error for commands to thrusters that keep a station: they would not be heard."""
+        if self.trial.station is not None and any(numbers[len(FOUR) :]):
+            raise CommandError(
+                f"At t = {self.time:g} s thrusters are commanded that keep the station of '{self.trial.name}'. Give"
+                " four numbers, or take dataclasses.replace(trial, station=None)."
+            )
+
+    def _command_at(self, time: float) -> list[float]:
         """Return the command of the scenario at a time [s]."""
-        commands = self.trial.commands
-        if commands is None:
-            return 0.0, 0.0, 0.0, 0.0
-        n, rudder, port, starboard = commands.at(time).tolist()
-        return n, rudder, port, starboard
+        return list(held(self._orders.time, self._orders.values, time).tolist())
 
     def _message(self) -> str:
         """Return how the last step ended."""

@@ -5,7 +5,8 @@
     φ' = p + tan θ (q sin φ + r cos φ),   θ' = q cos φ − r sin φ,   ψ' = (q sin φ + r cos φ)/cos θ
 
 with the forces of `vehicle.derivative`. A control engineer's state: Euler angles for the quaternion (pitch remains
-away from ±90°), a full battery, and no play in the linkages, which is an event and no differential equation.
+away from ±90°), a full battery, and no play in the linkages, which is an event and no differential equation. A vehicle
+with listed actuators has a state and an input more for each of its `channels`, behind these (`states_of`, `inputs_of`).
 
 Trim needs more of propeller and fins: the vehicle without their limits, the demands of a state on them compared with
 those limits, and the commands that lead to a state.
@@ -15,7 +16,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import cos, degrees, inf, isinf, pi, sin, tan
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -80,28 +81,48 @@ UNITS = {signal.name: signal.unit for signal in (*STATES, *INPUTS, *MIXED)}
 
 PLACE = {name: i for i, name in enumerate(STATE_NAMES)}
 DEPTH, ROLL, PITCH, HEADING, SURGE = 2, 3, 4, 5, 6
-VELOCITY, ACTUATORS = slice(6, 12), slice(12, 16)
+VELOCITY, ACTUATORS, CHANNELS = slice(6, 12), slice(12, 16), slice(16, None)
 
 NO_CURRENT, NO_WRENCH = np.zeros(3), np.zeros(6)
 
 
+def states_of(hull: Vehicle) -> tuple[Signal, ...]:
+    """Return the states of a vehicle: `STATES`, and one for each of its channels."""
+    return STATES + tuple(Signal(f"{each.name}_state", each.name, each.unit) for each in hull.channels)
+
+
+def inputs_of(hull: Vehicle) -> tuple[Signal, ...]:
+    """Return the inputs of a vehicle: `INPUTS`, and one for each of its channels."""
+    return INPUTS + tuple(Signal(f"{each.name}_command", each.name, each.unit) for each in hull.channels)
+
+
+def resting_state(hull: Vehicle) -> np.ndarray:
+    """Return x of a vehicle at rest, without any command: zeros, and listed fins at their offsets."""
+    rest = [min(max(each.offset, each.low), each.high) for each in hull.channels]
+    return np.concatenate([np.zeros(len(STATES)), rest])
+
+
 def to_vehicle(x: np.ndarray) -> np.ndarray:
-    """Return the state of `vehicle.STATE` for a state x (16,)."""
-    state = np.zeros(STATE_SIZE)
+    """Return the state of `vehicle.STATE` for a state x (16 and one for each channel,)."""
+    state = np.zeros(STATE_SIZE + x.size - len(STATES))
     state[:3] = x[:3]
     state[3:7] = quaternion_from_euler(float(x[ROLL]), float(x[PITCH]), float(x[HEADING]))
     state[7:13] = x[VELOCITY]
     state[SHAFT : SHAFT + 4] = x[ACTUATORS]
     state[LINKAGE : LINKAGE + 3] = state[SERVO : SERVO + 3]
+    state[STATE_SIZE:] = x[CHANNELS]
     return state
 
 
-def from_vehicle(state: np.ndarray, heading_near: float = 0.0) -> np.ndarray:
-    """Return x (16,) for a state of `vehicle.STATE`; the heading within half a turn of `heading_near` [rad]."""
+def from_vehicle(state: np.ndarray, heading_near: float = 0.0, channels: int = 0) -> np.ndarray:
+    """Return x (16 and more,) for a state of `vehicle.STATE`; the heading within half a turn of `heading_near` [rad],
+    and so many states of `channels` behind.
+    """
     roll, pitch, heading = euler_angles(state[3:7])
     turns = round((heading_near - heading) / (2.0 * pi))
     angles = (roll, pitch, heading + 2.0 * pi * turns)
-    return np.concatenate([state[:3], angles, state[7:13], state[SHAFT : SHAFT + 4]])
+    own = state[STATE_SIZE : STATE_SIZE + channels]
+    return np.concatenate([state[:3], angles, state[7:13], state[SHAFT : SHAFT + 4], own])
 
 
 def rate(
@@ -111,22 +132,23 @@ def rate(
     wrench_b: np.ndarray = NO_WRENCH,
     current_n: np.ndarray = NO_CURRENT,
 ) -> np.ndarray:
-    """Return x' (16,).
+    """Return x' (16 and one for each channel,).
 
     Args:
-        x: state, as in `STATES`.
-        command: propeller [rev/s], rudder, port and starboard plane [rad].
+        x: state, as in `states_of`.
+        command: propeller [rev/s], rudder, port and starboard plane [rad], and that of each channel.
         numbers: of the vehicle.
         wrench_b: external force and moment about the hull centre, body axes (6,). [N, N m]
         current_n: velocity of the water, earth axes (3,). [m/s]
     """
-    out = np.empty(STATE_SIZE)
-    derivative(to_vehicle(x), command, current_n, wrench_b, numbers, out)
+    state = to_vehicle(x)
+    out = np.empty(state.size)
+    derivative(state, command, current_n, wrench_b, numbers, out)
     p, q, r = x[9:12]
     sr, cr = sin(x[ROLL]), cos(x[ROLL])
     turning = q * sr + r * cr
     angles = (p + tan(x[PITCH]) * turning, q * cr - r * sr, turning / cos(x[PITCH]))
-    return np.concatenate([out[:3], angles, out[7:13], out[SHAFT : SHAFT + 4]])
+    return np.concatenate([out[:3], angles, out[7:13], out[SHAFT : SHAFT + 4], out[STATE_SIZE:]])
 
 
 class Demand(NamedTuple):
@@ -140,7 +162,7 @@ class Demand(NamedTuple):
 
 def ideal(hull: Vehicle) -> Vehicle:
     """Return a vehicle whose actuators have no limit, dead band, offset, play or sag; lags remain (none:
-    `QUICKEST`).
+    `QUICKEST`). Listed actuators are as quick as their lags.
     """
 
     def servo(servo: Servo) -> Servo:
@@ -156,18 +178,40 @@ def ideal(hull: Vehicle) -> Vehicle:
     lag = max(hull.motor.lag, QUICKEST)
     return replace(
         hull,
-        fins=tuple((name, replace(fin, deflection_limit=pi)) for name, fin in hull.fins),
         motor=replace(hull.motor, lag=lag, speed_per_volt=inf, voltage_sensitivity=0.0),
         rudder_servo=servo(hull.rudder_servo),
         stern_plane_port_servo=servo(hull.stern_plane_port_servo),
         stern_plane_starboard_servo=servo(hull.stern_plane_starboard_servo),
+        fins=_quick(hull.fins),
+        moving_masses=_quick(hull.moving_masses),
+        buoyancy_engines=_quick(hull.buoyancy_engines),
     )
 
 
+def _quick(listed: tuple[tuple[str, Any], ...]) -> tuple[tuple[str, Any], ...]:
+    """Return listed actuators without a limit of their rates; fins turn as far as a half circle."""
+    free = dict.fromkeys(("rate_limit", "slide_rate", "turn_rate", "pump_rate"), inf) | {
+        "deflection_limit": pi
+    }
+    return tuple(
+        (name, replace(part, **{key: value for key, value in free.items() if hasattr(part, key)}))
+        for name, part in listed
+    )
+
+
+def thruster_demands(hull: Vehicle, x: np.ndarray) -> list[Demand]:
+    """Return the demands of a state (16 and one for each channel,) on each thruster, but for those that are dead."""
+    return [
+        Demand(f"thruster {name}", abs(float(share)), 1.0 - thruster.lost_command, "of full command")
+        for (name, thruster), share in zip(hull.thrusters, x[CHANNELS], strict=False)
+        if thruster.lost_command < 1.0
+    ]
+
+
 def demands(hull: Vehicle, x: np.ndarray) -> list[Demand]:
-    """Return the demands of a state (16,) on each actuator."""
+    """Return the demands of a state (16 and more,) on propeller and fins."""
     propeller = Demand("propeller", abs(float(x[12])), fastest_propeller(hull, float(x[SURGE])), "rev/s")
-    fins = zip(("rudder", "port stern-plane", "starboard stern-plane"), x[13:], servos(hull), strict=True)
+    fins = zip(("rudder", "port stern-plane", "starboard stern-plane"), x[13:16], servos(hull), strict=True)
     return [propeller] + [_fin_demand(name, float(angle), servo) for name, angle, servo in fins]
 
 
@@ -184,11 +228,21 @@ def servos(hull: Vehicle) -> tuple[Servo, Servo, Servo]:
 
 
 def commands(hull: Vehicle, x: np.ndarray) -> np.ndarray:
-    """Return the commands (4,) that lead to the actuators of a state: offset, dead band and sag undone."""
+    """Return the commands (4 and one for each channel,) that lead to the actuators of a state: offset, dead band and
+    sag undone.
+    """
     volts = _loaded_voltage(hull, float(x[12]), float(x[SURGE]))
     sag = hull.motor.voltage_sensitivity * (1.0 - volts / hull.battery.full_voltage)
-    fins = [_command(float(angle), servo) for angle, servo in zip(x[13:], servos(hull), strict=True)]
-    return np.array([float(x[12]) / (1.0 - sag), *fins])
+    fins = [_command(float(angle), servo) for angle, servo in zip(x[13:16], servos(hull), strict=True)]
+    return np.array([float(x[12]) / (1.0 - sag), *fins, *listed_commands(hull, x)])
+
+
+def listed_commands(hull: Vehicle, x: np.ndarray) -> list[float]:
+    """Return the commands that lead the listed actuators to where they are in a state; none for one that is dead."""
+    return [
+        (float(state) - each.offset) / (1.0 - each.lost_command) if each.lost_command < 1.0 else 0.0
+        for each, state in zip(hull.channels, x[CHANNELS], strict=True)
+    ]
 
 
 def _command(angle: float, servo: Servo) -> float:

@@ -15,8 +15,9 @@ import numpy as np
 from cable import MovingEnd, pull_out
 from subzero.errors import UserError, short
 from subzero.model import Model
+from subzero.steady_motion.asked import Asked
 from subzero.steady_motion.hull_state_space import VELOCITY, to_vehicle
-from subzero.steady_motion.trim_point import Asked, Trim, steady_motion
+from subzero.steady_motion.trim_point import Trim, steady_motion
 from vehicle import rotation
 
 CABLES = ("formula", "model")
@@ -30,6 +31,7 @@ def trim(
     turn_rate: float = 0.0,
     wet_length: float = 0.0,
     roll: float = 0.0,
+    sway_speed: float = 0.0,
     cable: str = "formula",
 ) -> Trim:
     """Return the steady motion of a model at a speed.
@@ -40,7 +42,8 @@ def trim(
         depth_rate: z', positive down. [m/s]
         turn_rate: ψ', positive to starboard. [rad/s]
         wet_length: cable in the water; its pull is taken as steady although it grows. [m]
-        roll: φ, held by unlike stern-planes. [rad]
+        roll: φ, held by unlike stern-planes, or by thrusters. [rad]
+        sway_speed: v, to starboard through the water, held by thrusters. [m/s]
         cable: "formula", ½ρπdC_t U² S and friction along the way of the tow point; or "model", the cable itself,
             pulled along a way of that length. (In a turn less of it remains in the water: it cuts the corner.)
 
@@ -48,7 +51,8 @@ def trim(
         NoTrimError: there is none: which limit is hit, and how far one can go.
         UserError: a number that means nothing here; the cable could not be solved along this way.
     """
-    asked = Asked(speed=speed, depth_rate=depth_rate, turn_rate=turn_rate, wet_length=wet_length, roll=roll)
+    motion = {"speed": speed, "depth_rate": depth_rate, "turn_rate": turn_rate, "sway_speed": sway_speed}
+    asked = Asked(**motion, wet_length=wet_length, roll=roll)
     if not isinstance(cable, str) or cable not in CABLES:
         raise UserError(f"trim: cable is {short(cable)}; it must be one of {', '.join(CABLES)}.")
     return steady_motion(model, asked, partial(cable_pull, model) if cable == "model" else None)

@@ -9,198 +9,53 @@ current only carries the track.
 
 A motion that is impossible is refused with the reason, and the largest motion that is possible (`NoTrimError`).
 
-The force of the cable in steady motion is (`SteadyPull`)
-
-    F_c = −(½ρπdC_t |V|² S + C_f/R_d) V/|V|,   M_c = r_c × F_c          (37), with the drum's friction
-
-V is the velocity of the tow point through the water, v + ω × r_c. The cable lies along the way that the tow point
-came: exact for a straight way (the discrete cable has this solution at every step); in a turn it is the limit of a
-cable that cannot be dragged sideways, C_n ≫ C_t, and the real one cuts the corner. A cable with weight is not in the
-formula. Where that matters, `subzero.steady_motion.trim` pulls the cable itself along the way.
-
-A vehicle that speeds up takes its cable along: m S more of mass at the tow point, along V.
+The force of the cable is that of `subzero.steady_motion.steady_pull`. A vehicle on thrusters has other unknowns
+(`thruster_motion`), and may stand still; a glider has, too (`glider_motion`), and must sink or rise.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from math import ceil, cos, degrees, floor, radians, sin, sqrt
+from dataclasses import dataclass, replace
+from math import ceil, floor
 from typing import NoReturn
 
 import numpy as np
 
-from subzero.errors import UserError, real, short
 from subzero.files.text_repr import Overview
 from subzero.model import Model
+from subzero.steady_motion.asked import FASTEST, Asked, NoTrimError
+from subzero.steady_motion.glider_motion import GliderMotion, channel_demands, is_glider
+from subzero.steady_motion.glider_motion import refusal as glider_refusal
 from subzero.steady_motion.hull_state_space import (
-    DEPTH,
-    PITCH,
-    ROLL,
+    ACTUATORS,
     STATE_NAMES,
     SURGE,
     VELOCITY,
+    Demand,
     commands,
     demands,
     ideal,
-    rate,
+    listed_commands,
+    resting_state,
+    thruster_demands,
 )
-from vehicle import Vehicle, VehicleNumbers
-
-NO_WAY = 1e-9
-"""Below this speed of the tow point there is no direction to pull against. [m/s]"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class SteadyPull:
-    """The cable of a model at a fixed length.
-
-    Attributes:
-        drag: ½ρπdC_t S. [kg/m]
-        friction: C_f/R_d. [N]
-        mass: m S. [kg]
-        tow_point: r_c, body axes (3,). [m]
-    """
-
-    drag: float
-    friction: float
-    mass: float
-    tow_point: np.ndarray
-
-    @classmethod
-    def of(cls, model: Model, wet_length: float) -> SteadyPull:
-        """Return the cable of a model with `wet_length` metres in the water; none pulls with none."""
-        pulls = 1.0 if wet_length > 0.0 else 0.0
-        return cls(
-            drag=model.cable.tangential_drag * wet_length,
-            friction=pulls * model.drum.friction_torque / model.drum.radius,
-            mass=model.cable.mass_per_length * wet_length,
-            tow_point=model.vehicle.tow_point.position(),
-        )
-
-    def wrench(self, nu: np.ndarray) -> np.ndarray:
-        """Return force and moment on the hull (6,), body axes [N, N m], at nu (6,) through the water."""
-        V = nu[:3] + np.cross(nu[3:], self.tow_point)
-        speed = float(np.linalg.norm(V))
-        if speed < NO_WAY:
-            return np.zeros(6)
-        F = -(self.drag * speed + self.friction / speed) * V
-        return np.concatenate([F, np.cross(self.tow_point, F)])
-
+from subzero.steady_motion.propeller_motion import Motion
+from subzero.steady_motion.steady_pull import SteadyPull
+from subzero.steady_motion.thruster_motion import ThrusterMotion, is_on_thrusters, refusal
+from vehicle import Vehicle
 
 RESIDUAL = 1e-9
 """Tolerances of accelerations and depth rate. [m/s2, rad/s2, m/s]"""
-FARTHEST = 1.2
-"""Fin and pitch angles beyond this are another balance than the one that is looked for. [rad]"""
+AnyMotion = Motion | ThrusterMotion | GliderMotion
 
 
-FASTEST = 50.0
-"""A run that is faster is stopped as absurd, `subzero.engine.coupling.FASTEST`. [m/s]"""
-STEEPEST = radians(80.0)
-"""Pitch beyond which Euler angles are no use any more. [rad]"""
+def solved(motion: AnyMotion, y: np.ndarray) -> np.ndarray | None:
+    """Return the unknowns of a motion from a guess; None if they are not found."""
+    from scipy.optimize import root
 
-
-class NoTrimError(UserError):
-    """There is no such steady motion; the message names the limit that is hit."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Asked:
-    """Which steady motion.
-
-    Attributes:
-        speed: u, forward speed through the water. [m/s]
-        depth_rate: z', positive down. [m/s]
-        turn_rate: ψ', positive to starboard. [rad/s]
-        wet_length: cable in the water; its pull is taken as steady although it grows. [m]
-        roll: φ, held by unlike stern-planes. [rad]
-
-    Raises:
-        NoTrimError: a depth rate that is too steep at this speed.
-        UserError: a number that means nothing here.
-    """
-
-    speed: float
-    depth_rate: float = 0.0
-    turn_rate: float = 0.0
-    wet_length: float = 0.0
-    roll: float = 0.0
-
-    def __post_init__(self) -> None:
-        """Raise an error for a request that is not valid."""
-        for field in fields(self):
-            number = real(value := getattr(self, field.name))
-            if number is None:
-                raise UserError(f"trim: {field.name} is {short(value)}; it must be a finite number.")
-            object.__setattr__(self, field.name, number)
-        if self.speed <= 0.0:
-            raise UserError(f"trim: speed is {self.speed:g} m/s; fins need a flow, so it must be above 0.")
-        if self.speed > FASTEST:
-            raise UserError(
-                f"trim: speed is {self.speed:g} m/s; it must be at most {FASTEST:g}, as runs are stopped beyond."
-            )
-        if self.wet_length < 0.0:
-            raise UserError(f"trim: wet_length is {self.wet_length:g} m; it must be 0 or more.")
-        most = self.speed * sin(STEEPEST)
-        if abs(self.depth_rate) > most:
-            raise NoTrimError(
-                f"There is no steady motion at {self.speed:g} m/s with a depth rate of {self.depth_rate:g} m/s: the"
-                f" pitch angle would pass {degrees(STEEPEST):.0f} degrees. At this speed ±{most:.2g} m/s is the most."
-            )
-
-    def part(self, share: float) -> Asked:
-        """Return the same with a share of everything that is not straight and level."""
-        asked = {name: share * getattr(self, name) for name in ("depth_rate", "turn_rate", "roll")}
-        return replace(self, **asked)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Motion:
-    """The requested motion, of which hull (its numbers without limits), with which pull beyond the formula's."""
-
-    asked: Asked
-    numbers: VehicleNumbers
-    pull: SteadyPull
-    extra: np.ndarray
-
-    def part(self, share: float) -> Motion:
-        """Return the same with a share of everything that is not straight and level."""
-        return replace(self, asked=self.asked.part(share), extra=share * self.extra)
-
-    def state(self, y: np.ndarray) -> np.ndarray:
-        """Return x (16,) for the unknowns n, δ_r, δ_e, δ_d, θ, v, w."""
-        n, rudder, together, unlike, pitch, v, w = y
-        x, roll = np.zeros(16), self.asked.roll
-        x[ROLL], x[PITCH] = roll, pitch
-        spin = (-sin(pitch), cos(pitch) * sin(roll), cos(pitch) * cos(roll))
-        x[VELOCITY] = self.asked.speed, v, w, *(self.asked.turn_rate * part for part in spin)
-        x[12:] = n, rudder, together - unlike, together + unlike
-        return x
-
-    def left(self, y: np.ndarray) -> np.ndarray:
-        """Return the residual of the seven equations."""
-        x = self.state(y)
-        rates = rate(x, x[12:], self.numbers, self.pull.wrench(x[VELOCITY]) + self.extra)
-        return np.append(rates[VELOCITY], rates[DEPTH] - self.asked.depth_rate)
-
-    def solved(self, y: np.ndarray) -> np.ndarray | None:
-        """Return the unknowns from a guess; None if they are not found."""
-        from scipy.optimize import root
-
-        found = root(self.left, y, tol=1e-13).x
-        near = np.max(np.abs(found[1:5])) < FARTHEST
-        return found if near and np.max(np.abs(self.left(found))) < RESIDUAL else None
-
-
-def level_propeller(motion: Motion) -> float:
-    """Return n at which thrust balances drag and pull straight ahead with central fins, a n² − b n u − c u² = R."""
-    p, u = motion.numbers.propeller, motion.asked.speed
-    x = motion.part(0.0).state(np.zeros(7))
-    rates = rate(x, x[12:], motion.numbers, motion.pull.wrench(x[VELOCITY]))
-    brake = -float(motion.numbers.mass_matrix[0] @ rates[VELOCITY])  # with the propeller standing still
-    if p.thrust_nn == 0.0:
-        return 0.0
-    return (p.thrust_nu * u + sqrt((p.thrust_nu * u) ** 2 + 4.0 * p.thrust_nn * brake)) / (2.0 * p.thrust_nn)
+    found: np.ndarray = root(motion.left, y, tol=1e-13).x
+    return found if motion.is_near(found) and np.max(np.abs(motion.left(found))) < RESIDUAL else None
 
 
 STEPS = 20
@@ -221,8 +76,9 @@ class Trim:
         turn_rate: ψ', positive to starboard. [rad/s]
         wet_length: cable in the water. [m]
         length: of the hull, for scales of time L/U. [m]
-        state: x (16,), as in `STATES`, at the origin with heading 0.
-        command: propeller [rev/s], rudder, port and starboard plane [rad] (4,).
+        state: x (16 and one for each channel,), as in `states_of`, at the origin with heading 0.
+        command: propeller [rev/s], rudder, port and starboard plane [rad], and that of each channel.
+        listed: names of the channels.
         wrench: of the cable on the hull, body axes (6,). [N, N m]
     """
 
@@ -234,6 +90,7 @@ class Trim:
     state: np.ndarray
     command: np.ndarray
     wrench: np.ndarray
+    listed: tuple[str, ...] = ()
 
     @property
     def propeller_rps(self) -> float:
@@ -242,21 +99,22 @@ class Trim:
 
     @property
     def command_angles(self) -> np.ndarray:
-        """Command (4,) of actuators without offset, dead band and sag, as linear models have them."""
-        return self.state[12:].copy()
+        """Command (4 and more,) of actuators without offset, dead band and sag, as linear models have them."""
+        return np.concatenate([self.state[ACTUATORS], self.command[4:]])
 
     @property
     def time_scale(self) -> float:
-        """L/U [s]."""
-        return self.length / self.speed
+        """L/U, of a vehicle at rest over 1 m/s. [s]"""
+        return self.length / (abs(self.speed) or 1.0)
 
     def named(self) -> dict[str, float]:
         """Return the state by name, SI and radians."""
-        return dict(zip(STATE_NAMES, self.state.tolist(), strict=True))
+        names = STATE_NAMES + tuple(f"{name}_state" for name in self.listed)
+        return dict(zip(names, self.state.tolist(), strict=True))
 
     def __repr__(self) -> str:
         """Return the motion in a few lines."""
-        rudder, port, starboard = np.degrees(self.command[1:])
+        rudder, port, starboard = np.degrees(self.command[1:4])
         roll, pitch = (np.degrees(self.named()[name]) for name in ("roll", "pitch"))
         motion = [f"{self.speed:.4g} m/s", f"{self.depth_rate:.4g} m/s down"]
         rows = [
@@ -266,6 +124,12 @@ class Trim:
             ("fins", f"rudder {rudder:.4g} degree", f"stern-planes {port:.4g} and {starboard:.4g} degree"),
             ("cable", f"{self.wet_length:.4g} m", f"pulls {np.linalg.norm(self.wrench[:3]):.4g} N"),
         ]
+        listed = [
+            f"{name} {x:.4g}"
+            for name, x in zip(self.listed, self.command[4:], strict=True)
+            if abs(x) > RESIDUAL
+        ]
+        rows += [("listed", *listed)] if listed else []
         return Overview("Steady motion", rows).text()
 
 
@@ -285,10 +149,18 @@ def steady_motion(model: Model, asked: Asked, pull_of: Pull | None = None) -> Tr
         NoTrimError: there is none: which limit is hit, and how far one can go.
         UserError: the pull cannot be had.
     """
+    if is_on_thrusters(model.vehicle) or is_glider(model.vehicle):
+        is_driven = is_on_thrusters(model.vehicle)
+        if refused := refusal(model.vehicle, asked) if is_driven else glider_refusal(asked):
+            raise NoTrimError(f"There is no steady motion of this vehicle: {refused}.")
+    elif not model.vehicle.propeller.thrust_constant > 0.0:
+        raise NoTrimError("There is no steady motion of this vehicle: it has no propeller and no thrusters.")
+    else:
+        asked.check_flow()
     try:
         return _trim(model, asked, pull_of)
     except NoTrimError as error:
-        slowest, most = held_speeds(model, asked.wet_length)
+        slowest, most = (0.0, 0.0) if is_glider(model.vehicle) else held_speeds(model, asked.wet_length)
         if slowest <= asked.speed <= most or not most:
             raise
         behind = f" on {asked.wet_length:g} m of cable" if asked.wet_length else ""
@@ -335,7 +207,7 @@ def _edge(model: Model, wet_length: float, held: float, beyond: float) -> float:
 def _trim(model: Model, asked: Asked, pull_of: Pull | None = None) -> Trim:
     """Return the steady motion; refused with the limit alone."""
     hull, pull = model.vehicle, SteadyPull.of(model, asked.wet_length)
-    motion = Motion(asked=asked, numbers=ideal(hull).numbers(), pull=pull, extra=np.zeros(6))
+    motion = _motion(hull, asked, pull)
     x = _balanced(hull, motion)
     if pull_of is not None and asked.wet_length > 0.0:
         for _ in range(PASSES):
@@ -349,20 +221,45 @@ def _trim(model: Model, asked: Asked, pull_of: Pull | None = None) -> Trim:
         wet_length=asked.wet_length,
         length=hull.hull.length,
         state=x,
-        command=commands(hull, x),
+        command=_commands(hull, x),
         wrench=pull.wrench(x[VELOCITY]) + motion.extra,
+        listed=tuple(channel.name for channel in hull.channels),
     )
 
 
-def _balanced(hull: Vehicle, motion: Motion) -> np.ndarray:
+def _motion(hull: Vehicle, asked: Asked, pull: SteadyPull) -> AnyMotion:
+    """Return the requested motion of a hull, on its thrusters or on propeller and fins."""
+    numbers = ideal(hull).numbers()
+    if is_on_thrusters(hull):
+        return ThrusterMotion.of(asked, hull, numbers, pull)
+    if is_glider(hull):
+        return GliderMotion.of(asked, hull, numbers, pull)
+    return Motion(asked=asked, numbers=numbers, rest=resting_state(hull), pull=pull, extra=np.zeros(6))
+
+
+def _commands(hull: Vehicle, x: np.ndarray) -> np.ndarray:
+    """Return the commands that lead to the actuators of a state."""
+    if is_on_thrusters(hull) or is_glider(hull):
+        return np.array([0.0] * 4 + listed_commands(hull, x))
+    return commands(hull, x)
+
+
+def _demands(hull: Vehicle, x: np.ndarray) -> list[Demand]:
+    """Return the demands of a state on the actuators that drive a vehicle."""
+    if is_glider(hull):
+        return channel_demands(hull, x)
+    return thruster_demands(hull, x) if is_on_thrusters(hull) else demands(hull, x)
+
+
+def _balanced(hull: Vehicle, motion: AnyMotion) -> np.ndarray:
     """Return the state of a steady motion, at once from straight level motion, or in steps."""
-    guess = np.array([level_propeller(motion), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
-    direct = motion.solved(guess)
+    guess = motion.guess()
+    direct = solved(motion, guess)
     if direct is not None:
         return motion.state(direct)
     reached = 0.0
     for share in np.linspace(0.0, 1.0, STEPS + 1):
-        found = motion.part(share).solved(guess)
+        found = solved(motion.part(share), guess)
         if found is None:
             raise_no_trim(hull, motion.part(reached).state(guess), reached)
         guess, reached = found, share
@@ -371,8 +268,10 @@ def _balanced(hull: Vehicle, motion: Motion) -> np.ndarray:
 
 def check_limits(hull: Vehicle, x: np.ndarray) -> None:
     """Raise an error for a steady motion that some actuator cannot hold."""
-    beyond = [demand for demand in demands(hull, x) if demand.value > demand.limit]
+    beyond = [demand for demand in _demands(hull, x) if demand.value > demand.limit]
     if beyond:
+        if is_on_thrusters(hull):  # one says it for all: they share a wrench
+            beyond = [max(beyond, key=lambda demand: demand.value / demand.limit)]
         said = "; ".join(
             f"the {each.name} would need {each.value:.3g} {each.unit}, its limit is {each.limit:.3g}"
             for each in beyond
@@ -389,7 +288,7 @@ def raise_no_trim(hull: Vehicle, x: np.ndarray, share: float) -> NoReturn:
         raise NoTrimError(
             f"There is no such steady motion: not even straight and level do the forces balance at {x[SURGE]:g} m/s."
         )
-    most = max(demands(hull, x), key=lambda demand: demand.value / demand.limit)
+    most = max(_demands(hull, x), key=lambda demand: demand.value / demand.limit)
     raise NoTrimError(
         f"There is no such steady motion: there is no balance beyond {share:.0%} of the asked depth rate, turn rate and"
         f" roll, where the {most.name} stands at {most.value:.3g} {most.unit} (limit {most.limit:.3g}): they stall."

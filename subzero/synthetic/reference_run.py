@@ -192,7 +192,7 @@ def truth_of(setting: Setting) -> Truth:
     setup, live = prepare(trial, model, True, run_in=0.0)
     rope = _rope(setting, setup, live, times)
     led = _led(times.size, rope.spring.shape[1])
-    recording = new_recording(times.size, live.line.length.size)
+    recording = new_recording(times.size, live.line.length.size, entries=live.state.size)
     row = 1
     record_row(setup, live, recording, 0, 0.0, 0)
     led.history[0, :3], led.history[0, 4] = live.now.force, live.now.length

@@ -92,3 +92,26 @@ def test_a_picture_of_the_replay_shows_the_yellow_vehicle_in_its_middle(browser:
     assert image.shape == (360, 640, 3)
     red, green, blue = image[150:210, 270:370].reshape(-1, 3).T
     assert np.mean((red > 1.5 * blue) & (green > 1.2 * blue)) > 0.1  # yellow: nothing else here is
+
+
+def test_thrusters_of_a_vehicle_push_as_in_the_dataset(tmp_path: Path) -> None:
+    """An arrow for each thruster of the vehicle, as long as its share of full thrust says."""
+    from dataclasses import replace
+
+    import subzero
+    from subzero.page import page_of_runs
+    from subzero.results.summary import summary_of
+
+    run = subzero.simulate(replace(subzero.load_scenario("rov_turn"), duration=6.0), tethered=False)
+    path = tmp_path / "rov.html"
+    path.write_text(page_of_runs({"untethered": run}, summary_of({"untethered": run}, None), {}, command="x"))
+    with browser_of_page.opened(path) as driver:
+        pushes = moved_to(driver, 4.0)["pushes"]["untethered"]
+        assert driver.get_log("browser") == []
+    at = run.sel(time=4.0, method="nearest")
+    wanted = {
+        name: float(share)
+        for name, share in zip(at["thruster"].values, at["thruster_command"].values, strict=True)
+    }
+    assert len(pushes) == 8
+    assert pushes == pytest.approx(wanted, abs=1e-3)

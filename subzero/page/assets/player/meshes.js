@@ -3,7 +3,7 @@
 import { cross, subtract, unit } from "./vectors.js";
 
 const YELLOW = [0.98, 0.74, 0.08], DARK = [0.13, 0.15, 0.18], BLUE = [0.0, 0.45, 0.7], RED = [0.83, 0.2, 0.12];
-const BRONZE = [0.78, 0.6, 0.33], STEEL = [0.62, 0.66, 0.7], WOOD = [0.55, 0.4, 0.26], WHITE = [0.93, 0.94, 0.93];
+const BRONZE = [0.78, 0.6, 0.33], STEEL = [0.62, 0.66, 0.7], ORANGE = [0.95, 0.45, 0.1], WOOD = [0.55, 0.4, 0.26], WHITE = [0.93, 0.94, 0.93];
 const AROUND = 24;  // sides of a hull: at 100 pixels across it is round to half a pixel
 
 /** A body of revolution about the forward axis; `rings` are [x, radius, colour of the ring at an angle]. */
@@ -74,8 +74,22 @@ function hullMesh(hull) {
   return revolved(rings);
 }
 
+/** A thruster's duct about the forward axis, of radius 1. */
+function ductMesh() {
+  const rings = [[-0.6, 0.8], [-0.6, 1], [0.6, 1], [0.6, 0.8], [-0.6, 0.8]].map(([x, r]) => [x, r, () => DARK]);
+  const hub = [[0.5, 0], [0.3, 0.25], [-0.6, 0.25], [-0.6, 0]].map(([x, r]) => [x, r, () => BRONZE]);
+  return [...revolved(rings, 20), ...revolved(hub, 12)];
+}
+
+/** An arrow along the forward axis, from 0 to 1, its shaft of radius 0.25. */
+function arrowMesh() {
+  const colour = () => ORANGE;
+  return revolved([[0, 0, colour], [0, 0.25, colour], [0.65, 0.25, colour], [0.65, 0.6, colour], [1, 0, colour]], 16);
+}
+
 /** One fin whose root lies on the hull: from a leading to a trailing edge along a span, thick in between. */
 function fin(section, root, across, colour) {
+  if (!section.area) return [];
   const span = Math.sqrt((section.aspect_ratio * section.area) / 2), chord = section.area / span;
   const thick = cross([1, 0, 0], across);
   const point = (x, out, t) => [0, 1, 2].map((i) => (i === 0 ? section.station + x : 0) + across[i] * (root + out) + thick[i] * t);
@@ -111,7 +125,9 @@ export function vehicleMeshes({ hull, rudder, stern_planes: planes, propeller: s
     rudder: [...fin(rudder, rootOf(rudder), [0, 0, 1], RED), ...fin(rudder, rootOf(rudder), [0, 0, -1], RED)],
     port: fin(planes, rootOf(planes), [0, -1, 0], DARK),
     starboard: fin(planes, rootOf(planes), [0, 1, 0], DARK),
-    propeller: propeller(screw.diameter),
+    propeller: screw.thrust_constant ? propeller(screw.diameter) : [],
+    duct: ductMesh(),
+    arrow: arrowMesh(),
     rudderAt: [rudder.station, 0, 0],
     planesAt: [planes.station, 0, 0],
     propellerAt: [stern, 0, 0],

@@ -260,10 +260,12 @@ class Player {
     ]));
   }
 
-  /** What is on the screen now: the time, and the place [north, east, depth] of each vehicle that was drawn. */
+  /** What is on the screen now: the time, the place [north, east, depth] of each vehicle that was drawn, and the
+   * arrows of its thrusters, as shares of full thrust. */
   shown() {
     const places = Object.entries(this.view.shown).map(([name, { position }]) => [name, [...position]]);
-    return { time: this.time, places: Object.fromEntries(places), camera: this.camera.mode, isPlaying: this.isPlaying };
+    const pushes = Object.entries(this.view.shown).map(([name, { pushes }]) => [name, pushes ?? {}]);
+    return { time: this.time, places: Object.fromEntries(places), pushes: Object.fromEntries(pushes), camera: this.camera.mode, isPlaying: this.isPlaying };
   }
 
   /** Draw with so many pixels a point. */

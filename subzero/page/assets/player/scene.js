@@ -3,7 +3,7 @@
 import { drumMesh, standMesh, vehicleMeshes, vesselMesh } from "./meshes.js";
 import { roundNumber } from "./data.js";
 import { background, bed, grid, line, solid, specks, surfaceFromAbove, surfaceFromBelow } from "./shaders.js";
-import { add, length, poseMatrix, product, projectionMatrix, subtract, transformed, turnAbout, viewMatrix } from "./vectors.js";
+import { add, alongMatrix, length, poseMatrix, product, projectionMatrix, scaled, subtract, transformed, turnAbout, unit, viewMatrix } from "./vectors.js";
 
 const FIELD_OF_VIEW = 0.75;                   // vertical [rad]
 const SMALLEST_VEHICLE = 0.055;               // a vehicle is never drawn shorter than this share of the distance to the target
@@ -11,6 +11,7 @@ const PROPELLER_SLOWED = 12;                  // a screen shows 25 turns a secon
 const GHOST = [1.0, 0.76, 0.50, 0.36], GHOST_TRACK = [1.0, 0.66, 0.36, 0.95], TRACK = [0.75, 0.93, 1.0, 0.85], DOTS = [1, 1, 1, 0.9];
 const WHITE_GHOST = [0.93, 0.98, 1.0, 0.45], WHITE_TRACK = [1, 1, 1, 0.95];   // what others are held against is white, all else that is no more than a ghost orange
 const SPECKS = 500;
+const DUCT = 0.07, ARROW = 1.0, LEAST_SHARE = 0.01;   // radius of a thruster, and its arrow at full command, as shares of the hull's length
 const BACKGROUND_TILES = [24, 24];
 
 const isReference = (actor) => actor.name === "measured" || actor.name === "nominal";
@@ -234,8 +235,23 @@ export class Scene {
     this.drawMesh(this.meshes.rudder, turned(rudderAt, [0, 0, 1], -radians("rudder_angle")), tint);
     this.drawMesh(this.meshes.port, turned(planesAt, [0, 1, 0], -radians("stern_plane_port_angle")), tint);
     this.drawMesh(this.meshes.starboard, turned(planesAt, [0, 1, 0], -radians("stern_plane_starboard_angle")), tint);
+    this.drawThrusters(actor, t, large, tint);
     const turns = (actor.propellerTurns(t) / PROPELLER_SLOWED) % 1;
     this.drawMesh(this.meshes.propeller, turned(propellerAt, [1, 0, 0], 2 * Math.PI * turns), tint);
+  }
+
+  /** Each thruster where it stands; an arrow is the push on the hull, at full command as long as the hull. */
+  drawThrusters(actor, t, large, tint) {
+    const size = this.replay.vehicle.hull.length, pushes = (this.shown[actor.name].pushes = {});
+    for (const [name, one] of Object.entries(this.replay.vehicle.thrusters ?? {})) {
+      const place = [one.x, one.y, one.z], ahead = [one.direction_x, one.direction_y, one.direction_z];
+      this.drawMesh(this.meshes.duct, product(large, alongMatrix(place, ahead, DUCT * size, DUCT * size)), tint);
+      const share = actor.has(`${name}_state`) ? actor.at(`${name}_state`, t) : 0;
+      if (!(Math.abs(share) > LEAST_SHARE)) continue;
+      pushes[name] = share;
+      const push = scaled(unit(ahead), Math.sign(share)), tip = add(place, scaled(push, 0.6 * DUCT * size));
+      this.drawMesh(this.meshes.arrow, product(large, alongMatrix(tip, push, ARROW * size * Math.abs(share), 0.6 * DUCT * size)), tint);
+    }
   }
 
   drawDrum(actor, t) {

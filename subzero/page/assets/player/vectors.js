@@ -60,3 +60,11 @@ export function projectionMatrix(angle, aspect, near, far) {
   const f = 1 / Math.tan(angle / 2), d = 1 / (near - far);
   return new Float64Array([f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (near + far) * d, -1, 0, 0, 2 * near * far * d, 0]);
 }
+
+/** The forward axis laid along a direction from a place, `long` for 1, and `wide` across it. */
+export function alongMatrix(place, direction, long, wide) {
+  const ahead = unit(direction), aside = Math.abs(ahead[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0];
+  const across = unit(cross(aside, ahead)), third = cross(ahead, across);
+  const columns = [scaled(ahead, long), scaled(across, wide), scaled(third, wide)];
+  return new Float64Array([...columns.flatMap((column) => [...column, 0]), ...place, 1]);
+}
