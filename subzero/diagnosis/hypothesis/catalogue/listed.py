@@ -7,7 +7,6 @@ command: it is the actuator that does less than it is told.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -67,18 +66,8 @@ def _lost_command(section: str, name: str, part: Any) -> Effect:
 
 def _with_lost_command(section: str, name: str, setting: Setting, share: float) -> Setting:
     """c + share, of one actuator."""
-    rows = tuple(
-        (row, _changed(part, lost_command=part.lost_command + share) if row == name else part)
-        for row, part in getattr(setting.model.vehicle, section)
-    )
-    return setting.with_model(vehicle=replace(setting.model.vehicle, **{section: rows}))
-
-
-def _changed(part: Any, **values: float) -> Any:
-    """Return an actuator with other values, unchecked: a search may look a little beyond the limits of files."""
-    made = object.__new__(type(part))
-    made.__dict__.update(part.__dict__ | values)
-    return made
+    old = dict(getattr(setting.model.vehicle, section))[name].lost_command
+    return setting.with_listed(section, name, lost_command=old + share)
 
 
 def _damping(axis: str, key: str) -> Effect:
@@ -96,11 +85,7 @@ def _damping(axis: str, key: str) -> Effect:
 
 def _with_damping(key: str, setting: Setting, share: float) -> Setting:
     """The derivative (1 + share)."""
-    hull = setting.model.vehicle
-    table = tuple(
-        (name, value * (1.0 + share) if name == key else value) for name, value in hull.derivatives.table
-    )
-    return setting.with_model(vehicle=replace(hull, derivatives=replace(hull.derivatives, table=table)))
+    return setting.with_derivative(key, 1.0 + share)
 
 
 def tether_pull(setting: Setting, forward: float, starboard: float) -> Setting:
