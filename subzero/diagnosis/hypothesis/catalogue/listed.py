@@ -1,5 +1,5 @@
-"""Effects of a vehicle's own: of its listed actuators (thrusters, fins, moving masses, buoyancy engines), of the damping
-of a hull that thrusters drive, and of its tether.
+"""Effects of a vehicle's own: of its listed actuators (thrusters, fins, moving masses, buoyancy engines), of the
+damping of a hull that thrusters drive, and of its tether.
 
 A vehicle without a list has none of these, and its catalogue is as it was. Station keeping knows nothing of a lost
 command: it is the actuator that does less than it is told.
@@ -65,7 +65,7 @@ def _lost_command(section: str, name: str, part: Any) -> Effect:
 
 
 def _with_lost_command(section: str, name: str, setting: Setting, share: float) -> Setting:
-    """c + share, of one actuator."""
+    """C + share, of one actuator."""
     old = dict(getattr(setting.model.vehicle, section))[name].lost_command
     return setting.with_listed(section, name, lost_command=old + share)
 
