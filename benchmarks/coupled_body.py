@@ -1,9 +1,10 @@
 """A buoyant body on a tether whose lower end is led away, then stopped: ours and MoorDyn, both coupled.
 
 `python -m benchmarks.coupled_body` prints the largest differences of its path and of the tension at it. The body is a
-free point in MoorDyn, with mass, volume, drag and added mass alike in all directions; ours is an open frame with the same
-by its table of derivatives (X_Uu = Y_Uv = Z_Uw), a hull that is coupled to its cable in the usual way. By the principle
-of relativity, led away in still water is moored in a current. Neither line has added mass, as in `peers.moordyn_wire`.
+free point in MoorDyn, with mass, volume, drag and added mass alike in all directions; ours is an open frame with the
+same by its table of derivatives (X_Uu = Y_Uv = Z_Uw), a hull that is coupled to its cable in the usual way. Led away in
+still water is moored in a current, by the principle of relativity. Neither line has added mass, as in
+`peers.moordyn_wire`.
 
 `pip install 'subzero-auv[peers]'` brings MoorDyn.
 """
@@ -81,7 +82,8 @@ def vehicle_text(body: Body) -> str:
     return "\n".join(
         [
             'base = "open_frame"', "[rigid_body]", f'mass = {{ value = {body.mass}, unit = "kg" }}', "[buoyancy]",
-            f'net_buoyancy = {{ value = {body.buoyancy}, unit = "N" }}', "[tow_point]", place, "[derivatives]", *rows, "",
+            f'net_buoyancy = {{ value = {body.buoyancy}, unit = "N" }}', "[tow_point]", place,
+            "[derivatives]", *rows, "",
         ]
     )  # fmt: skip
 
@@ -159,7 +161,7 @@ def moordyn_run(body: Body, count: int = 80) -> Run:
         point, line = moordyn.GetPoint(system, 2), moordyn.GetLine(system, 1)
         for k in range(round(DURATION_S / EXCHANGE)):
             here, there = (led(n * EXCHANGE)[0] for n in (k, k + 1))
-            place, velocity = first + [here, 0.0, 0.0], [(there - here) / EXCHANGE, 0.0, 0.0]
+            place, velocity = first + np.array([here, 0.0, 0.0]), [(there - here) / EXCHANGE, 0.0, 0.0]
             moordyn.Step(system, list(place), velocity, k * EXCHANGE, EXCHANGE)
             rows.append([*(UPWARD * moordyn.GetPointPos(point)), moordyn.GetLineFairTen(line)])
         moordyn.Close(system)
@@ -186,8 +188,13 @@ def main() -> None:
     """Print the differences, and how far each code is from itself with twice the segments."""
     body = Body()
     ours, theirs = our_run(body), moordyn_run(body)
-    print(f"behind by up to {np.abs(led(DURATION_S)[0] - theirs.place[:, 0]).max():.2f} m, deeper by up to", end=" ")
-    print(f"{theirs.place[:, 1].max():.2f} m, tension {theirs.tension.min():.1f} to {theirs.tension.max():.1f} N")
+    print(
+        f"behind by up to {np.abs(led(DURATION_S)[0] - theirs.place[:, 0]).max():.2f} m, deeper by up to",
+        end=" ",
+    )
+    print(
+        f"{theirs.place[:, 1].max():.2f} m, tension {theirs.tension.min():.1f} to {theirs.tension.max():.1f} N"
+    )
     for title, one, other in (
         ("ours and MoorDyn", ours, theirs),
         ("ours, segments of 0.25 and 0.5 m", ours, our_run(body, 0.5)),

@@ -140,7 +140,7 @@ def _letter_factors(found: re.Match[str]) -> list[str]:
 
 
 def complaint(name: str, named: Sequence[str]) -> tuple[str, str] | None:
-    """Return why a name is no derivative, and what is allowed, the nearest name first; None if it is one."""
+    """Return why a name is no derivative, and the allowed names, the nearest first; None if it is one."""
     if parsed(name, named):
         return None
     bare = name.removesuffix("'")
@@ -149,7 +149,7 @@ def complaint(name: str, named: Sequence[str]) -> tuple[str, str] | None:
     head, _, tail = bare[2:].partition("_")
     if not (tail and LETTERS.fullmatch(head) and parsed(bare[: 2 + len(head)], named)):
         return "no such derivative", HOW
-    names = [*named, *(f"{one}_{two}" for one in named for two in named)]
+    names = [*named, *(f"{first}_{second}" for first in named for second in named)]
     close = nearest(tail, names)
     near = f"{bare[: 2 + len(head)]}_{close[0]}; " if close else ""
     return f"no factor is called '{tail}'", f"{near}after the letters stand {', '.join(named)}"

@@ -80,7 +80,7 @@ class ProductsOfInertia(Section):
 
 
 def inertia_problems(body: RigidBody, products: ProductsOfInertia | None) -> list[Problem]:
-    """Return the problem of products of inertia that no body has beside its inertias."""
+    """Return the problem of products of inertia that no body of these inertias has."""
     if products is None:
         return []
     if not isinstance(products, ProductsOfInertia):
@@ -90,7 +90,7 @@ def inertia_problems(body: RigidBody, products: ProductsOfInertia | None) -> lis
     if np.linalg.eigvalsh(inertias + products.matrix()[3:, 3:])[0] > 0.0:
         return []
     why = "about some axis the inertia would be negative"
-    allowed = "products that are small beside the inertias of the rigid body"
+    allowed = "products that are small compared with the inertias of the rigid body"
     return [Problem(key="products_of_inertia", found=short(products.values()), why=why, allowed=allowed)]
 
 
