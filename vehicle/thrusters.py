@@ -68,6 +68,10 @@ class Thruster(Section):
         arm = np.cross([self.x, self.y, self.z], self.direction) + self.reaction_arm * self.direction
         return np.concatenate([self.direction, arm])
 
+    def thrust_at(self, share: float) -> float:
+        """Return the thrust at rest at a lagged command. [N]"""
+        return float(thrust_at_rest(share, self.row()))
+
     def row(self) -> np.ndarray:
         """Return the row of the compiled table (COLUMNS,)."""
         curve = (self.thrust_ahead, self.thrust_astern, self.curve_exponent, self.dead_band)
@@ -101,6 +105,12 @@ def thruster_force(share: float, inflow: float, row: np.ndarray) -> tuple[float,
     most = row[AHEAD] if share > 0.0 else -row[ASTERN]
     bollard = most * c ** row[EXPONENT]
     return bollard, bollard - row[INFLOW] * c * inflow
+
+
+@compiled
+def thrust_at_rest(share: float, row: np.ndarray) -> float:
+    """Return the thrust at a lagged command, without inflow. [N]"""
+    return thruster_force(share, 0.0, row)[0]
 
 
 @compiled

@@ -19,6 +19,7 @@ import numpy as np
 import scenarios
 from subzero.autopilot import indices
 from subzero.autopilot.flight import fly
+from subzero.autopilot.helm import HARD_OVER, FinHelm, Helm, ThrusterHelm
 from subzero.autopilot.standard import Wanted
 from subzero.channels import Observation
 from subzero.errors import UserError, checked, chosen
@@ -26,6 +27,7 @@ from subzero.model import Model, load, model_of
 from subzero.simulation.run import Progress
 from subzero.steady_motion.asked import NoTrimError
 from subzero.steady_motion.hull_state_space import INPUT_NAMES
+from subzero.steady_motion.thruster_motion import is_on_thrusters, unheld
 from subzero.steady_motion.trim import trim
 from subzero.steady_motion.trim_point import held_speeds
 
@@ -40,7 +42,10 @@ USUAL_SPEED = 1.0
 SPARE = 1.25
 """A hull that needs a faster flow gets so much more than the least that holds it level, for its fins. [-]"""
 
-Command = tuple[float, float, float, float]
+SHARE_OF_THE_FASTEST = 0.5
+"""Of what thrusters hold straight ahead, where the usual speed is too fast. [-]"""
+
+Command = tuple[float, ...]
 
 
 @dataclass(kw_only=True)
@@ -48,13 +53,13 @@ class Program(ABC):
     """The straight run that all manoeuvres begin with; final classes add the rest in `after`.
 
     Attributes:
-        straight: command of the straight run: propeller [rev/s], rudder, port and starboard plane [rad].
+        helm: what moves the vehicle: propeller and fins, or thrusters.
         size: of the manoeuvre: rudder or planes; share of the propeller speed for a crash stop. [rad, 1]
         sample_time: [s]
         name: for messages.
     """
 
-    straight: Command
+    helm: Helm
     size: float
     sample_time: float = 0.1
     name: str = "manoeuvre"
@@ -68,7 +73,7 @@ class Program(ABC):
     def update(self, reading: Observation, wanted: Wanted) -> Command:
         """Return the command for the next sample."""
         if reading.time < RUN_IN - 1e-9:
-            return self.straight
+            return self.helm.straight
         self.started = self.started or reading
         return self.after(reading, self.started)
 
@@ -85,13 +90,11 @@ class Program(ABC):
 
     def with_rudder(self, angle: float) -> Command:
         """Return the straight command with a rudder [rad]."""
-        n, _, port, starboard = self.straight
-        return n, angle, port, starboard
+        return self.helm.command(rudder=angle)
 
     def with_planes(self, angle: float) -> Command:
         """Return the straight command with both planes moved [rad]."""
-        n, rudder, port, starboard = self.straight
-        return n, rudder, port + angle, starboard + angle
+        return self.helm.command(planes=angle)
 
 
 class TurningCircle(Program):
@@ -159,8 +162,7 @@ class CrashStop(Program):
 
     def after(self, now: Observation, started: Observation) -> Command:
         """Return the propeller astern, the fins as they were."""
-        n, *fins = self.straight
-        return (-self.size * n, *fins)  # type: ignore[return-value]
+        return self.helm.command(propulsion=-self.size)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -260,7 +262,7 @@ def manoeuvre(
         name: one of `MANOEUVRES`.
         scenario: whose vehicle, cable and start; its commands are not used.
         size: rudder or planes [degree], or the share of the propeller speed of a crash stop; by default the table's, as
-            far as the fins go.
+            far as the fins go. Of a vehicle on thrusters, of the moments and the thrust that stand for these (`helm`).
         speed: of the bare hull in the straight run, which the propeller is set for; by default `USUAL_SPEED`, or more
             if the hull needs more to be held level. [m/s]
         tethered: with the cable.
@@ -276,24 +278,36 @@ def manoeuvre(
     _check_actuators(line, name, model)
     speed = usual_speed(model) if speed is None else speed
     inner = _checked_size(line, min(line.size, _largest(line, model)) if size is None else size, model)
-    straight = tuple(trim(model, speed=speed).command.tolist())
-    program = line.program(straight=straight, size=inner, name=name, sample_time=trial.cable_step)
-    begin = replace(trial, start=replace(trial.start, surge_speed=speed), duration=RUN_IN + line.duration)
+    helm = _helm(model, speed)
+    program = line.program(helm=helm, size=inner, name=name, sample_time=trial.cable_step)
+    start = replace(trial.start, surge_speed=speed)
+    begin = replace(trial, start=start, duration=RUN_IN + line.duration, station=None)
     run = fly(begin, program, lambda t: _NOTHING, tethered=tethered, model=model, progress=progress)
     run = run.drop_vars(["wanted_speed", "wanted_heading", "wanted_depth"])
-    return run, line.measure(_inner(run), inner)
+    return run, line.measure(_inner(run, helm), inner)
+
+
+def _helm(model: Model, speed: float) -> Helm:
+    """Return what moves a vehicle in a manoeuvre from a steady speed [m/s]."""
+    steady = trim(model, speed=speed)
+    if is_on_thrusters(model.vehicle):
+        return ThrusterHelm.of(model.vehicle, steady)
+    return FinHelm(tuple(steady.command.tolist()))
 
 
 def _check_actuators(line: Manoeuvre, name: str, model: Model) -> None:
     """Raise an error for a vehicle that lacks what a manoeuvre moves."""
     hull = model.vehicle
+    if is_on_thrusters(hull):
+        if line.program is VerticalZigZag and "pitch" in (unheld(hull) or ()):
+            raise UserError(f"{name} needs thrusters that pitch the vehicle, and its own do not.")
+        return
     lacking = [] if hull.propeller.thrust_constant > 0.0 else ["propeller"]
     fins = {"rudder": hull.has_rudder, "stern-planes": hull.has_stern_planes}
     moved = {ZigZag: "rudder", TurningCircle: "rudder", Spiral: "rudder", VerticalZigZag: "stern-planes"}
     lacking += [fin for fin, there in fins.items() if moved.get(line.program) == fin and not there]
     if lacking:
-        other = " Its thrusters keep a station: see rov_turn." if hull.thrusters else ""
-        raise UserError(f"{name} needs a {' and a '.join(lacking)}, and this vehicle has none.{other}")
+        raise UserError(f"{name} needs a {' and a '.join(lacking)}, and this vehicle has none.")
 
 
 def usual_speed(model: Model) -> float:
@@ -305,6 +319,8 @@ def usual_speed(model: Model) -> float:
         trim(model, speed=USUAL_SPEED)
     except NoTrimError:
         slowest, most = held_speeds(model)
+        if is_on_thrusters(model.vehicle):  # the rest of the thrust is for the manoeuvre
+            return SHARE_OF_THE_FASTEST * most
         return min(SPARE * slowest, most) if slowest > USUAL_SPEED else most or USUAL_SPEED
     return USUAL_SPEED
 
@@ -324,11 +340,15 @@ def _checked_size(line: Manoeuvre, asked: float, model: Model) -> float:
 
 def _largest(line: Manoeuvre, model: Model) -> float:
     """Return the largest size that fins, or a propeller astern, can do. [degree; 1]"""
+    if is_on_thrusters(model.vehicle):
+        return 1.0 if line.unit == "1" else degrees(HARD_OVER)
     return 5.0 if line.unit == "1" else degrees(model.vehicle.rudder_servo.deflection_limit)
 
 
-def _inner(run: xr.Dataset) -> dict[str, np.ndarray]:
-    """Return the channels that are measured, in SI and radians."""
+def _inner(run: xr.Dataset, helm: Helm) -> dict[str, np.ndarray]:
+    """Return the channels that are measured, in SI and radians; of thrusters the angles that their moments stand
+    for.
+    """
     names = ("north", "east", "heading", "pitch", "surge_speed", "yaw_rate", *INPUT_NAMES)
     found: dict[str, Any] = {"time": run["time"].values}
     for name in names:
@@ -336,4 +356,7 @@ def _inner(run: xr.Dataset) -> dict[str, np.ndarray]:
         found[name] = run[name].values * scale
     together = 0.5 * (found["stern_plane_port_command"] + found["stern_plane_starboard_command"])
     found["planes"] = np.where(np.abs(together - together[0]) < 1e-9, 0.0, together - together[0])
+    if isinstance(helm, ThrusterHelm):
+        commands = np.column_stack([run[f"{name}_command"].values for name, _ in helm.hull.thrusters])
+        found |= {"rudder_command": helm.angles("yaw", commands), "planes": helm.angles("pitch", commands)}
     return found

@@ -35,6 +35,8 @@ MANOEUVRE_COMMANDS = {
     "vertical_zigzag": ("pitch", "stern_plane_port_command"),
     "crash_stop": ("heading", "propeller_command"),
 }
+THRUSTER_CHANNELS = {"vertical_zigzag": ("pitch", "pitch_rate"), "crash_stop": ("heading", "surge_speed")}
+"""The same of a vehicle on thrusters, whose commands are those of many."""
 STEP_COMMANDS = {
     "heading_step": ("heading", "rudder_command"),
     "depth_step": ("depth", "stern_plane_port_command"),
@@ -112,7 +114,8 @@ def manoeuvre(
         return run(name, trial, size=size, speed=speed, tethered=label == "tethered", progress=progress)
 
     meaning = f": {MANOEUVRES[name].meaning}" if name in MANOEUVRES else ""
-    shown = MANOEUVRE_COMMANDS.get(name, ("heading", "rudder_command"))
+    commands = THRUSTER_CHANNELS if trial.vehicle.get("thrusters") else MANOEUVRE_COMMANDS
+    shown = commands.get(name, ("heading", "yaw_rate" if commands is THRUSTER_CHANNELS else "rudder_command"))
     return _deliver(trial, fly, out or Path(name), f"{name}{meaning}", shown, output_mode)
 
 

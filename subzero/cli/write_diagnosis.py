@@ -24,7 +24,7 @@ from rich.table import Table
 from rich.text import Text
 
 from subzero.cli.output_mode import COMMAND, PLAIN, OutputMode
-from subzero.diagnosis.hypothesis.catalogue import all_effects
+from subzero.diagnosis.hypothesis.catalogue import all_effects, with_own
 from subzero.diagnosis.hypothesis.hypotheses import apply_extended
 from subzero.diagnosis.report import json_file, tables, words
 from subzero.diagnosis.report.sections import Section as Told
@@ -188,9 +188,8 @@ def write_all(
         shutil.copyfile(effects_file, output_folder.path / effects_file.name)
     sources = ", ".join(trial.record.source for trial in logged)
     own = effects_file.name if effects_file is not None else None
-    extended = text_of(
-        verdict.extended, logged[0].setting, effects=all_effects(effects), effects_file=own, source=sources
-    )
+    known = all_effects(with_own(effects, logged[0].setting.model.vehicle))
+    extended = text_of(verdict.extended, logged[0].setting, effects=known, effects_file=own, source=sources)
     _write(output_folder, "extended.toml", extended)
     reported = {trial.name: _about(trial) for trial in logged}
     _write(output_folder, "diagnosis.json", json_file.text(verdict, reported, logged[0].setting.trial.source))
@@ -326,7 +325,7 @@ def replayed(
     """
     if not verdict.complete:
         return (), ""
-    known = all_effects(effects)
+    known = all_effects(with_own(effects, logged.setting.model.vehicle))
     name, extended = _best(verdict)
     nominal = run(logged.setting)
     if nominal.sizes["time"] < 2 or not all(part in _vehicle(nominal) for part in HULL):

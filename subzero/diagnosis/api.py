@@ -29,7 +29,7 @@ from subzero.arguments import checked_arguments
 from subzero.channels import BY_NAME
 from subzero.diagnosis.assessment.goodness_of_fit import curves, misfits
 from subzero.diagnosis.assessment.identifiability import detectability, with_whole_effects
-from subzero.diagnosis.hypothesis.catalogue import load
+from subzero.diagnosis.hypothesis.catalogue import load, with_own
 from subzero.diagnosis.hypothesis.data_error import DataError
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.logged import NO_RECORD, Logged
@@ -177,7 +177,7 @@ def diagnose_trials(
         raise UserError(NO_RECORD)
     whole("seed", seed)
     chosen(dict.fromkeys(BUDGETS), budget, "budget")
-    effects = tuple(effects)
+    effects = with_own(effects, records[0].setting.model.vehicle)
     asked: dict[str, Any] = {
         "effects": effects,
         "progress": progress,

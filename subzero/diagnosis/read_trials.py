@@ -118,13 +118,8 @@ def _logged(
             "beside it."
         )
     trial = load(named)
-    if trial.station is not None:
-        raise UserError(
-            f"'{trial.name}' keeps a station with thrusters, which no cause of the catalogue knows: it can be "
-            "simulated and compared, not diagnosed or calibrated."
-        )
     _refuse(record.source, time_problems(record, trial, longer=commands == FROM_RECORD))
-    trial = cut_to(trial_with_commands(trial, record, commands), record)
+    trial = _with_some_commands(cut_to(trial_with_commands(trial, record, commands), record))
     values, notes = _channels(record, sidecar)
     if scenario and sidecar.scenario and str(scenario) != sidecar.scenario:
         notes += (f"Its sidecar names the trial {sidecar.scenario}, so {scenario} is not taken for it.",)
@@ -140,6 +135,16 @@ def _logged(
         name=name,
         notes=notes,
     )
+
+
+def _with_some_commands(trial: scenarios.Trial) -> scenarios.Trial:
+    """Return a trial that keeps a station with commands of zero beside it: its thrusters are commanded by the station,
+    in the simulation of each hypothesis anew, and nothing else is.
+    """
+    if trial.commands is not None or trial.station is None:
+        return trial
+    nothing = scenarios.Commands(time=np.zeros(1), values=np.zeros((1, len(REPORTED_COMMANDS))))
+    return dataclasses.replace(trial, commands=nothing)
 
 
 def _channels(record: Record, sidecar: Metadata) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:

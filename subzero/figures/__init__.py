@@ -74,7 +74,7 @@ def draw(runs: Runs | xr.Dataset, record: Record | None = None) -> dict[str, Fig
 def _commanded(runs: Runs, record: Record | None, title: Title) -> dict[str, Figure]:
     """Return the figures of a vehicle that follows commands."""
     run = next(iter(runs.values()))
-    has_propeller = json.loads(run.attrs["parameters"])["vehicle"]["propeller"]["thrust_constant"] > 0.0
+    has_propeller = _has_propeller(run)
     figures: dict[str, Figure] = {}
     if has_propeller:
         figures |= {"fig6": figure_6(runs, record, title), "attitude": attitude(runs, record, title)}
@@ -86,6 +86,12 @@ def _commanded(runs: Runs, record: Record | None, title: Title) -> dict[str, Fig
         figures |= _cable(runs["tethered"], title)
     figures["forces"] = forces(runs.get("tethered", run), title)
     return figures
+
+
+def _has_propeller(run: xr.Dataset) -> bool:
+    """Return whether the vehicle of a run has a propeller; those of a run that does not say so have one."""
+    propeller = json.loads(run.attrs["parameters"])["vehicle"].get("propeller", {})
+    return bool(propeller.get("thrust_constant", 1.0) > 0.0)
 
 
 def _prescribed(runs: Runs, title: Title) -> dict[str, Figure]:

@@ -224,6 +224,8 @@ def trial_with_commands(trial: scenarios.Trial, record: Record, use: str | None)
     names = [name for name in REPORTED_COMMANDS if name in record.values]
     if use == FROM_RECORD:
         return _with_recorded_commands(record, names, trial)
+    if trial.station is not None:
+        return trial
     if trial.commands is None:
         raise UserError(
             f"The scenario {trial.name} prescribes the motion, so nothing tells what the vehicle was commanded. "
@@ -256,6 +258,8 @@ def _agree(trial: scenarios.Trial, record: Record, names: list[str]) -> None:
 
 def _with_recorded_commands(record: Record, names: list[str], trial: scenarios.Trial) -> scenarios.Trial:
     """Return the trial with the record's commands; columns that it does not have remain those of the scenario."""
+    if record.listed:
+        return _with_listed_commands(record, trial)
     if not names:
         wanted = ", ".join(BY_NAME[name].column for name in REPORTED_COMMANDS)
         raise UserError(
@@ -266,11 +270,36 @@ def _with_recorded_commands(record: Record, names: list[str], trial: scenarios.T
         missing = ", ".join(BY_NAME[name].column for name in REPORTED_COMMANDS if name not in names)
         raise UserError(f"--commands record: {record.source} lacks {missing}, and {trial.name} has none.")
     columns = [_column(record, name, at, trial.commands) for at, name in enumerate(REPORTED_COMMANDS)]
+    return dataclasses.replace(trial, commands=_new_commands(record, columns), motion=None)
+
+
+def _with_listed_commands(record: Record, trial: scenarios.Trial) -> scenarios.Trial:
+    """Return the trial with the record's commands of listed actuators, in place of a station; what is not recorded
+    remains that of the scenario, or zero.
+    """
+    zero = scenarios.Commands(time=np.zeros(1), values=np.zeros((1, len(REPORTED_COMMANDS))))
+    others = trial.commands or zero
+    four = [_column(record, name, at, others) for at, name in enumerate(REPORTED_COMMANDS)]
+    listed = [
+        held(record.time[known], column[known], record.time)
+        for column in record.listed.values()
+        for known in [np.isfinite(column)]
+    ]
+    commands = _new_commands(record, [*four, *listed], tuple(record.listed))
+    try:
+        return dataclasses.replace(trial, commands=commands, motion=None, station=None)
+    except scenarios.ScenarioError as error:
+        raise UserError(f"{record.source}: its commands are not those of {trial.name}. {error}") from None
+
+
+def _new_commands(
+    record: Record, columns: list[np.ndarray], listed: tuple[str, ...] = ()
+) -> scenarios.Commands:
+    """Return commands at the times at which they change."""
     values = np.column_stack(columns)
     new = np.flatnonzero(np.r_[True, np.any(np.diff(values, axis=0) != 0.0, axis=1)])
     time = np.where(new == 0, 0.0, record.time[new])
-    commands = scenarios.Commands(time=time, values=np.ascontiguousarray(values[new]))
-    return dataclasses.replace(trial, commands=commands, motion=None)
+    return scenarios.Commands(time=time, values=np.ascontiguousarray(values[new]), listed=listed)
 
 
 def _column(record: Record, name: str, at: int, others: scenarios.Commands | None) -> np.ndarray:

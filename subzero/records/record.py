@@ -78,6 +78,7 @@ class Record:
         values: channel name → measured values in the channel's display unit, NaN where there is a gap.
         notes: data that were set aside, and why, in sentences.
         intervals: channel → time between two measurements, where a logger filled in what lies between. [s]
+        listed: listed actuator → its command as recorded, 1, rad, m or m3.
     """
 
     source: str
@@ -85,6 +86,18 @@ class Record:
     values: Mapping[str, np.ndarray]
     notes: tuple[str, ...] = ()
     intervals: Mapping[str, float] = field(default_factory=dict)
+    listed: Mapping[str, np.ndarray] = field(default_factory=dict)
+
+
+LISTED_COLUMN = re.compile(r"(?P<name>\w+?)_(?P<kind>command|state)(?P<unit>|_deg|_m|_m3)")
+"""Column of a listed actuator, as a run writes it: ``front_port_command``, ``upper_port_command_deg``."""
+IN_EVERY_VEHICLE = ("propeller", "rudder", "stern_plane", "stern_plane_port", "stern_plane_starboard")
+
+
+def listed_column(name: str) -> re.Match[str] | None:
+    """Return the parts of a column of a listed actuator; None of any other."""
+    found = LISTED_COLUMN.fullmatch(name)
+    return found if found and name not in BY_COLUMN and found["name"] not in IN_EVERY_VEHICLE else None
 
 
 @checked_arguments
@@ -112,8 +125,17 @@ def read_record(path: str | Path) -> Record:
     problems += _empty_problems(columns)
     problems += _heading_problems(columns.get(BY_NAME[HEADING].column, np.empty(0)))
     _refuse(path, problems)
-    values = {BY_COLUMN[name].name: column for name, column in columns.items() if name != TIME.column}
-    return as_measured(Record(source=_name(path), time=columns[TIME.column], values=values))
+    values = {
+        BY_COLUMN[name].name: column
+        for name, column in columns.items()
+        if name != TIME.column and name in BY_COLUMN
+    }
+    listed = {
+        found["name"]: np.radians(column) if found["unit"] == "_deg" else column
+        for name, column in columns.items()
+        if (found := listed_column(name)) and found["kind"] == "command"
+    }
+    return as_measured(Record(source=_name(path), time=columns[TIME.column], values=values, listed=listed))
 
 
 def as_measured(record: Record) -> Record:
@@ -224,7 +246,7 @@ def _header_problems(header: list[str]) -> list[str]:
             "from the start: 111 320 m a degree, east times the cosine of the latitude (integers are 1e-7 degrees); "
             f"{IMPORTED}"
         ]
-    problems = [_unknown(name) for name in header if name not in BY_COLUMN]
+    problems = [_unknown(name) for name in header if name not in BY_COLUMN and not listed_column(name)]
     if problems:
         problems.append(
             f"rename such a column, in the unit of its new name, or leave it out. Columns are {TIME.column}, "

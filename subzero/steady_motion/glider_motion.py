@@ -3,7 +3,7 @@
     ν'(s, γ, V, φ, θ, v, w) = 0,   z' = depth rate,   (p, q, r) = J⁻¹ (0, 0, ψ')
 
 s and γ are slide and turn of the first moving mass, V the volume of the first buoyancy engine: a glider that dives or
-climbs, straight or in a spiral. The roll angle is unknown here, as it is what turns a glider. The weight drives, so a
+climbs, straight or in a spiral. The roll angle is unknown here: it turns a glider. The weight drives, so a
 depth rate must be asked for.
 """
 
@@ -62,7 +62,7 @@ class GliderMotion:
         numbers: of the hull, its actuators without limits.
         places: of slide, turn and volume among the channels.
         pull: of the cable.
-        extra: what is added to it.
+        extra: added to that pull.
     """
 
     asked: Asked

@@ -14,6 +14,7 @@ import pytest
 import subzero
 from subzero import autopilot
 from subzero.autopilot import Wanted
+from subzero.autopilot.helm import FinHelm
 from subzero.autopilot.manoeuvres import VerticalZigZag, ZigZag
 from subzero.autopilot.stability_margins import check_stable
 from subzero.cli.app import MISTAKE, main
@@ -183,7 +184,7 @@ def test_a_cable_that_nobody_measures_is_not_left_out_unseen(fig6, tuning, ahead
 @pytest.mark.parametrize("program, channel", [(ZigZag, "heading"), (VerticalZigZag, "pitch")])
 def test_a_zigzag_that_does_not_see_its_angle_is_told(fig6, program, channel):
     sensors = [sensor for sensor in autopilot.PERFECT if sensor.channel != channel]
-    pilot = program(straight=(25.0, 0.0, 0.0, 0.0), size=0.2)
+    pilot = program(helm=FinHelm((25.0, 0.0, 0.0, 0.0)), size=0.2)
     with pytest.warns(
         autopilot.AutopilotWarning, match=f"the {channel} is not a number: no sensor measures it"
     ):

@@ -269,7 +269,7 @@ def test_a_complete_table_leaves_the_coriolis_forces_of_added_mass_to_its_produc
         ({"Y_v'": 1.0}, "it would drive the hull"),
         ({"complete": 0.5}, "0 or 1"),
         ({f"Y_{a}{b}{c}": 1.0 for a in "uvwpqr" for b in "uvwpqr" for c in "uvwpqr" if len({a, b, c}) > 1},
-         "so many have no room"),
+         "more than the compiled equations hold"),
     ],
 )  # fmt: skip
 def test_tables_that_cannot_be_are_refused_in_one_message(table, said):

@@ -97,6 +97,23 @@ class Setting:
             vehicle = _changed(vehicle, {section: _changed(part, {name: value})})
         return self.with_model(vehicle=vehicle)
 
+    def with_listed(self, section: str, name: str, **changes: float) -> Setting:
+        """Return the setting with numbers of one of a vehicle's list changed, such as of a thruster."""
+        vehicle = self.model.vehicle
+        rows = tuple(
+            (row, _changed(part, changes) if row == name else part) for row, part in getattr(vehicle, section)
+        )
+        return self.with_model(vehicle=_changed(vehicle, {section: rows}))
+
+    def with_derivative(self, key: str, factor: float) -> Setting:
+        """Return the setting with a derivative of the vehicle times a factor."""
+        vehicle = self.model.vehicle
+        table = tuple(
+            (name, factor * value if name == key else value) for name, value in vehicle.derivatives.table
+        )
+        derivatives = dataclasses.replace(vehicle.derivatives, table=table)  # its matrices are made anew
+        return self.with_model(vehicle=_changed(vehicle, {"derivatives": derivatives}))
+
     def with_cable(self, **changes: float) -> Setting:
         """Return the setting with numbers of the cable changed."""
         return self.with_model(cable=dataclasses.replace(self.model.cable, **changes))

@@ -92,9 +92,16 @@ def knots_of(problem: Problem, spacing: float = COARSE_SPACING_S) -> Knots:
 
 def typical_force(setting: Setting, axis: str) -> float:
     """Return the size of a usual force on an axis: the hull's drag at 1 m/s; a moment by a lever. [N, N m]"""
-    drag = setting.model.vehicle.numbers().axial_drag
+    hull = setting.model.vehicle.numbers()
+    drag = hull.axial_drag or _drag_of_damping(hull)
     lever = {"K": 0.02, "M": 0.1, "N": 0.1}.get(axis, 1.0)
     return drag * lever
+
+
+def _drag_of_damping(hull: vehicle.VehicleNumbers) -> float:
+    """Return the drag at 1 m/s of a hull whose drag is all stated as damping. [N]"""
+    linear = abs(hull.linear_damping[0]) + abs(hull.linear_table[0, 0])
+    return float(linear + abs(hull.quadratic_damping[0]) + abs(hull.quadratic_table[0, 0]))
 
 
 def without_force(setting: Setting, force: MissingForce) -> Setting:

@@ -40,7 +40,7 @@ from scenarios import ScenarioError
 from scenarios.files import Source, read_toml
 from subzero.arguments import checked_arguments
 from subzero.channels import RENAMED_CHANNELS
-from subzero.diagnosis.hypothesis.catalogue import all_effects
+from subzero.diagnosis.hypothesis.catalogue import all_effects, with_own
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter, plain_id
 from subzero.diagnosis.hypothesis.hypotheses import starts_of
@@ -99,7 +99,7 @@ def text_of(
         effects_file: Python file of the user's own effects, if there are any.
         source: records that it was found from.
     """
-    known = effects or all_effects()
+    known = effects or all_effects(with_own((), setting.model.vehicle))
     own = f" --effects {shlex.quote(printable(str(effects_file)))}" if effects_file else ""
     lines = [
         "# The model extended by what a diagnosis found. Numbers are deviations from the nominal model.",

@@ -13,11 +13,12 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 from subzero.arguments import checked_arguments
-from subzero.diagnosis.hypothesis.catalogue import cable, fins, hull, propulsion, sensors
+from subzero.diagnosis.hypothesis.catalogue import cable, fins, hull, listed, propulsion, sensors
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE, SAMPLED, SPECS, START
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.errors import UserError
 from subzero.files.read_file import MOST_OF_A_PROGRAM, read_bytes
+from vehicle import Vehicle
 
 __all__ = ["NOISE", "ONSETS", "SAMPLED", "SPECS", "START", "all_effects", "catalogue", "load"]
 ONSETS = (*fins.ONSETS, *hull.ONSETS, *propulsion.ONSETS)
@@ -35,6 +36,13 @@ def catalogue(channels: Iterable[str], more: Iterable[Effect] = ()) -> dict[str,
     if twice:
         raise UserError(f"Effects need ids of their own; there are two of {', '.join(twice)}.")
     return {effect.id: effect for effect in found}
+
+
+def with_own(more: Iterable[Effect], hull: Vehicle) -> tuple[Effect, ...]:
+    """Return further causes, and those that follow from the lists of a vehicle."""
+    known = tuple(more)
+    ids = {effect.id for effect in known}
+    return (*known, *(effect for effect in listed.effects_of(hull) if effect.id not in ids))
 
 
 @checked_arguments
