@@ -60,6 +60,8 @@ GALLERY = (
           figures=("deployment", "cable")),
     Shown(title="A remotely operated vehicle on station", commands=("subzero compare rov_turn",), folder="rov_turn",
           figures=("station",)),
+    Shown(title="A glider", commands=("subzero simulate glider_sawtooth --untethered",), folder="glider_sawtooth",
+          figures=("actuators",)),
     Shown(title="A manoeuvre", commands=("subzero manoeuvre zigzag",), folder="zigzag", figures=("manoeuvre",)),
     Shown(title="An autopilot", commands=("subzero autopilot heading_step --autopilot lqr --feed-forward model",),
           folder="heading_step", figures=("manoeuvre",)),
@@ -81,7 +83,7 @@ GALLERY = (
 EXAMPLES = (
     "fig6", "own_trial", "own_cable", "measured_record", "sweep", "cable_pulled_out", "static_shape", "winch",
     "vehicle_alone", "own_controller", "autopilot", "gymnasium_environment", "diagnose", "calibrate",
-    "tether_buoy", "tether_snap", "tether_fmu", "ardupilot_rov",
+    "glider", "tether_buoy", "tether_snap", "tether_fmu", "ardupilot_rov",
 )  # fmt: skip
 """The scripts of ``examples/``, in the order of the page."""
 

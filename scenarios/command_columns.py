@@ -1,9 +1,9 @@
 """The columns of [commands]: propeller, rudder and stern-planes, and one for each listed actuator of the vehicle.
 
-A listed actuator is commanded by its name: a thruster's column is its share of full thrust (``front_port``), a fin's is
-its angle (``upper_port_deg``), a moving mass has two (``battery_slide_m``, ``battery_turn_deg``), a buoyancy engine's is
-its volume (``bladder_m3``). What is not commanded stands at zero. A vehicle that has no propeller, rudder or
-stern-planes need not command them.
+A listed actuator is commanded by its name: a thruster's column is its share of full thrust (``front_port``), a fin's
+is its angle (``upper_port_deg``), a moving mass has two (``battery_slide_m``, ``battery_turn_deg``), a buoyancy
+engine's is its volume (``bladder_m3``). A column that is left out stands at zero. A vehicle that has no propeller,
+rudder or stern-planes need not command them.
 
 `vehicle.channels` says the same of a vehicle that is made; this package does not know it, and a test holds the two
 together.
@@ -59,7 +59,7 @@ Fault = tuple[str, object, str, str]
 
 
 def command_faults(listed: Sequence[str], values: np.ndarray, vehicle: Table) -> list[Fault]:
-    """Return what is wrong with commands to listed actuators: one that the vehicle lacks, a value beyond its limits.
+    """Return the faults of commands to listed actuators: one that the vehicle lacks, a value beyond its limits.
 
     Args:
         listed: names of the actuators.

@@ -28,7 +28,14 @@ from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source, read_toml, shipped, shipped_path
 from scenarios.similar_vehicle import BASE, complete
 from scenarios.similar_vehicle import SECTION as KNOWN
-from scenarios.vehicle_lists import optional_leaves, value_left_out
+from scenarios.vehicle_lists import (
+    DERIVATIVES,
+    factor_names,
+    optional_leaves,
+    primed_names,
+    value_left_out,
+)
+from subzero.derivative_names import complaint
 from subzero.errors import short as shown
 
 PATTERNS = {"vehicle": ("vehicles", "subzero2"), "cable": ("cables", "table1")}
@@ -111,6 +118,8 @@ def read_part(source: Source, kind: str, named: str) -> tuple[Part, list[Problem
 @lru_cache(maxsize=4)
 def part_of(part: Source, kind: str) -> tuple[Part, list[Problem]]:
     """Return the vehicle or the cable of a file, one of the last few that were read, and its problems."""
+    if kind == "vehicle":
+        part = _with_primes(part)
     if kind == "vehicle" and BASE in part.table:
         part = _completed(part)
     values, problems = _checked(part, pattern(kind))
@@ -145,11 +154,7 @@ def _checked(source: Source, model: Source) -> tuple[dict[str, float], list[Prob
     wanted, given = dict(leaves(model.table)), dict(leaves(source.table))
     if model is pattern("vehicle"):
         wanted |= optional_leaves(given)
-    problems = [
-        source.problem(key, "this file has no such key", nearest_or_all(key, wanted))
-        for key in given
-        if key not in wanted
-    ]
+    problems = [source.problem(key, *_no_such_key(key, wanted, given)) for key in given if key not in wanted]
     values, missing = {}, []
     for key, leaf in wanted.items():
         if key not in given and key in OPTIONAL:
@@ -185,6 +190,27 @@ def _incomplete(source: Source, model: Source, missing: list[Problem]) -> Proble
 def unit_of(kind: str, key: str) -> str:
     """Return the unit of a number that a file of a kind may leave out."""
     return str((dict(leaves(pattern(kind).table)) | optional_leaves({key: {}}))[key]["unit"])
+
+
+def _no_such_key(key: str, allowed: Mapping[str, Leaf], given: Mapping[str, Leaf]) -> tuple[str, str]:
+    """Return why a key cannot be, and the remedy."""
+    if key.startswith(DERIVATIVES) and (
+        said := complaint(key.removeprefix(DERIVATIVES), factor_names(given))
+    ):
+        return said[0], f"Allowed: {said[1]}."
+    return "this file has no such key", nearest_or_all(key, allowed)
+
+
+def _with_primes(source: Source) -> Source:
+    """Return a vehicle file with a prime at the names of the derivatives without dimensions, those of unit "1"."""
+    given = source.table.get(DERIVATIVES[:-1])
+    names = primed_names(given) if isinstance(given, Mapping) else {}
+    if not names or not isinstance(given, Mapping):
+        return source
+    primed = {names.get(name, name): leaf for name, leaf in given.items()}
+    lines = {f"{DERIVATIVES}{new}": source.line(f"{DERIVATIVES}{name}") or 0 for name, new in names.items()}
+    table = source.table | {DERIVATIVES[:-1]: primed}
+    return replace(source, table=table, lines=source.lines | lines)
 
 
 def leaves(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Leaf]]:
@@ -289,8 +315,10 @@ def _numbers_by_key(
     for key, value in given.items():
         place = f"{section}.{key}"
         if key not in allowed:
-            why = "no vehicle and no cable has such a value"
-            problems.append(source.problem(place, why, _nearest(key, allowed)))
+            why, remedy = "no vehicle and no cable has such a value", _nearest(key, allowed)
+            if key.startswith(f"vehicle.{DERIVATIVES}"):
+                why, remedy = _no_such_key(key.removeprefix("vehicle."), allowed, _of_vehicle(given))
+            problems.append(source.problem(place, why, remedy))
         elif complaint := complaint_of(value, allowed[key], key):
             problems.append(source.problem(place, *complaint, found=value))
         else:
@@ -299,8 +327,13 @@ def _numbers_by_key(
 
 
 def _of_vehicle(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the keys of a vehicle among those of vehicle and cable."""
-    return {key.removeprefix("vehicle."): value for key, value in given.items() if key.startswith("vehicle.")}
+    """Return the keys of a vehicle among those of vehicle and cable, and a fin for each that a derivative names.
+
+    Which fins there are stands in the file of the vehicle; the vehicle itself refuses others.
+    """
+    own = {key.removeprefix("vehicle."): value for key, value in given.items() if key.startswith("vehicle.")}
+    names = [key.removesuffix("'").split("_", 2) for key in own if key.startswith(DERIVATIVES)]
+    return own | {f"fins.{parts[2]}.x": {} for parts in names if len(parts) > 2}
 
 
 def _flat(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, Any]]:

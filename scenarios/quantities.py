@@ -203,6 +203,7 @@ propeller_rps       | rev/s | 0.01   | 200   | 0 | command of the propeller at s
 propeller_diameter_m | m    | 0.005  | 5     | 0 | diameter of the propeller
 fin_area_m2         | m2    | 1e-5   | 10    | 0 | plan area of one exposed fin; rudders and stern-planes alike
 fin_station_m       | m     | -50    | 50    | 0 | centre of pressure of the fins, forward of the hull centre
+tail_angle_deg      | degree | 0     | 89    | 0 | how far the tail is turned from a cross; 45: fins in X
 tow_station_m       | m     | -50    | 50    | 0 | tow point, forward of the hull centre
 water_density_kg_m3 | kg/m3 | 900    | 1100  | 0 | density of the water that it is ballasted for
 """)

@@ -39,6 +39,7 @@ import numpy as np
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source
 from scenarios.quantities import KNOWN
+from scenarios.turned_tail import CORNERS, turn_tail
 from subzero.errors import real
 
 Leaf = Mapping[str, Any]
@@ -191,8 +192,10 @@ def complete(source: Source, base: Mapping[str, Leaf], leaves: Mapping[str, Leaf
         table.setdefault(section, {})[name] = made
     for key, leaf in leaves.items():
         section, _, name = key.rpartition(".")
-        # A key that the base does not have is a thruster's or a derivative, or is refused later.
+        # A key that the base does not have is of a listed actuator or a derivative, or is refused later.
         table.setdefault(section, {}).setdefault(name, leaf)
+    if angle := real(source.table.get(SECTION, {}).get("tail_angle_deg")):
+        turn_tail(table, angle)
     return replace(source, table=table, text="\n".join(_text(source, table)) + "\n")
 
 
@@ -339,7 +342,7 @@ def _drive(source: Source, given: Given, factors: dict[str, float]) -> dict[str,
 
     def number(key: str) -> float:
         said = given.said(key)
-        if key.startswith("derivatives."):
+        if key.startswith(("derivatives.", "fins.")):
             return said or 0.0
         return factors.get(key, 1.0) * given.before(key) if said is None else said
 
@@ -392,9 +395,11 @@ def _drag(number: Any, speed: float) -> float:
     fins = sum(
         number(f"{fin}.area") * number(f"{fin}.profile_drag_coefficient")
         for fin in ("rudder", "stern_planes")
+    ) + 0.5 * sum(
+        number(f"fins.{name}.area") * number(f"fins.{name}.profile_drag_coefficient") for name in CORNERS
     )
-    linear, square = (number(f"derivatives.X_{name}") for name in ("u", "uu"))
-    hull += rho * fins - square
+    linear, square, primed = (number(f"derivatives.X_{name}") for name in ("u", "uu", "uu'"))
+    hull += rho * fins - square - 0.5 * rho * number("hull.length") ** 2 * primed
     return float(hull * speed**2 - (linear + number("linear_damping.surge")) * speed)
 
 

@@ -2,16 +2,18 @@
 
     [thrusters.front_port]       [fins.upper_port]       [moving_masses.battery]       [buoyancy_engines.bladder]
 
-`vehicle.lists` has the meaning of their numbers; here are the units, and what a file may leave out.
+`vehicle.lists` has the meaning of their numbers; here are the units, and the keys that a file may leave out.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
+
+from subzero.derivative_names import COMPLETE, FIN_NAMES, RACE, parsed
 
 Leaf = Mapping[str, Any]
 Leaves = dict[str, Leaf]
@@ -95,12 +97,27 @@ kg s ; roll_per_roll_rate pitch_per_pitch_rate yaw_per_yaw_rate
 """)
 """Coefficients of forces in flow axes, [flow_axes]: all or none."""
 
-OPTIONAL_SECTIONS = ("derivatives", "flow_axes", *LISTS)
+SECTIONS = {
+    "sections": Table(
+        _units("""
+m ; x breadth height
+1 ; lateral_drag_coefficient vertical_drag_coefficient
+""")
+    )
+}
+"""Sections of a hull that is no body of revolution, [sections.name]: the table of each."""
+FURTHER = {
+    "products_of_inertia": _units("kg m2 ; xy xz yz"),
+    "race": _units("m ; advance\n1 ; thrust_loading"),
+}
+"""Further sections: all of their numbers or none."""
+
+OPTIONAL_SECTIONS = ("derivatives", "flow_axes", *LISTS, *SECTIONS, *FURTHER)
 """Sections that a vehicle file need not have."""
 
-LISTED = re.compile(rf"(?P<section>{'|'.join(LISTS)})\.(?P<name>[^.]+)\.(?P<key>[^.]+)")
-DERIVATIVE = re.compile(r"derivatives\.[XYZKMN]_(?P<speed>[uvwpqr])(dot|\|?(?P=speed)\|?)?")
-"""``derivatives.X_u``, ``X_uu`` or ``X_u|u|``, ``X_udot``."""
+TABLES = LISTS | SECTIONS
+LISTED = re.compile(rf"(?P<section>{'|'.join(TABLES)})\.(?P<name>[^.]+)\.(?P<key>[^.]+)")
+DERIVATIVES = "derivatives."
 
 
 def optional_leaves(given: Mapping[str, Leaf]) -> Leaves:
@@ -114,25 +131,49 @@ def optional_leaves(given: Mapping[str, Leaf]) -> Leaves:
     listed: Leaves = {
         f"{section}.{name}.{key}": {"unit": unit}
         for section, name in rows
-        for key, unit in LISTS[section].units.items()
+        for key, unit in TABLES[section].units.items()
     }
-    winged = any(key.startswith("flow_axes.") for key in given)
-    axes: Leaves = {f"flow_axes.{key}": {"unit": unit} for key, unit in FLOW_AXES.items()} if winged else {}
-    derivatives: Leaves = {key: {"unit": derivative_unit(key)} for key in given if DERIVATIVE.fullmatch(key)}
-    return listed | axes | derivatives
+    whole = {"flow_axes": FLOW_AXES, **FURTHER}
+    further: Leaves = {
+        f"{section}.{key}": {"unit": unit}
+        for section, units in whole.items()
+        if any(key.startswith(f"{section}.") for key in given)
+        for key, unit in units.items()
+    }
+    units = {key: derivative_unit(key, factor_names(given)) for key in given if key.startswith(DERIVATIVES)}
+    return listed | further | {key: {"unit": unit} for key, unit in units.items() if unit}
 
 
 @cache
 def value_left_out(key: str) -> float | None:
     """Return the value of a number of a listed actuator that its file leaves out; None if it must say it."""
     match = LISTED.fullmatch(key)
-    return LISTS[match["section"]].optional.get(match["key"]) if match else None
+    return TABLES[match["section"]].optional.get(match["key"]) if match else None
 
 
-def derivative_unit(key: str) -> str:
-    """Return the unit of a derivative such as ``derivatives.K_pp``: force per speed, per speed squared, or per rate."""
-    force, _, speed = key.rpartition(".")[2].partition("_")
-    kind = 0 if speed.endswith("dot") else 2 if len(speed) > 1 else 1
-    metres = (force in "KMN") + (speed[0] in "pqr") * (2 if kind == 2 else 1) - (kind == 2)
-    length = {-1: "/m", 0: "", 1: " m", 2: " m2"}[metres]
-    return f"kg{length}/s" if kind == 1 else f"kg{length}"
+def factor_names(given: Mapping[str, Leaf]) -> tuple[str, ...]:
+    """Return the names that may be factors of a derivative of a file: of fins, listed ones too, and the race.
+
+    Args:
+        given: dotted key → inline table of the file.
+    """
+    fins = dict.fromkeys(key.split(".")[1] for key in given if key.startswith("fins."))
+    return (*FIN_NAMES, RACE, *fins)
+
+
+def derivative_unit(key: str, named: Sequence[str]) -> str | None:
+    """Return the unit of a derivative such as ``derivatives.K_pp``; None if it is none.
+
+    Args:
+        key: dotted.
+        named: of `factor_names`.
+    """
+    name = key.removeprefix(DERIVATIVES)
+    found = parsed(name, named)
+    return "1" if name == COMPLETE else found.unit if found else None
+
+
+def primed_names(table: Mapping[str, Any]) -> dict[str, str]:
+    """Return name → name with a prime, of the derivatives of a table that have no dimensions: those of unit "1"."""
+    bare = [name for name, leaf in table.items() if isinstance(leaf, Mapping) and leaf.get("unit") == "1"]
+    return {name: f"{name}'" for name in bare if not name.endswith("'") and name != COMPLETE}

@@ -22,12 +22,17 @@ C_D            axial drag coefficient                1           −½ρ(π/4)D�
 K_p, Y_vv …    further damping                       kg m2/s …   D ν, D ν|ν|                   damping
 n, T, Q        shaft speed, thrust, torque           rev/s, N    ρD⁴ K_T(J) n², ρD⁵ K_Q(J) n²  propeller
 w, t           wake fraction, thrust deduction       1           u_a = (1 − w) u, (1 − t) T    propeller
-C_L, C_D, α_s  lift, drag and stall of a fin         1, rad      attached, stalled, blended    fins
+C_L, C_D, α_s  lift, drag and stall of a fin         1, rad      attached, stalled, blended    fins, fin_list
+T, d           thrust and direction of a thruster    N, 1        T_max c^e                     thrusters
+V              volume of a buoyancy engine           m3          ρ g V                         buoyancy_engine
+r, ΔM          a moving mass, change of mass matrix  m           (M + ΔM) ν' = …               moving_mass
+K_D, K_α, …    drag and lift of a glider, per V²     kg/m        flow axes                     flow_axes
 δ_r, δ_s       rudder, stern-plane angle             rad         lag, limits, backlash         actuators
 V, I, q_e      voltage, current, charge drawn        V, A, C     V_full − k q_e − R I          motor
 """
 
 from vehicle.actuators import Servo
+from vehicle.buoyancy_engine import BuoyancyEngine
 from vehicle.channels import Channel
 from vehicle.dynamics import (
     POWERS,
@@ -43,11 +48,15 @@ from vehicle.dynamics import (
     power,
     relative_velocity,
 )
+from vehicle.fin_list import Fin
+from vehicle.flow_axes import FlowAxes
 from vehicle.free_run import FreeRun, free_run
 from vehicle.kinematics import euler_angles, initial_state, normalise, quaternion_from_euler, rotation
+from vehicle.moving_mass import MovingMass
 from vehicle.parameters import Problem, VehicleError
 from vehicle.state import STATE, STATE_SIZE
 from vehicle.terms import BREAKDOWN, TERMS
+from vehicle.thrusters import Thruster
 from vehicle.vehicle import SECTIONS, Vehicle, VehicleNumbers, from_mapping, to_mapping
 
 __all__ = [
@@ -57,10 +66,15 @@ __all__ = [
     "STATE",
     "STATE_SIZE",
     "TERMS",
+    "BuoyancyEngine",
     "Channel",
+    "Fin",
+    "FlowAxes",
     "FreeRun",
+    "MovingMass",
     "Problem",
     "Servo",
+    "Thruster",
     "Vehicle",
     "VehicleError",
     "VehicleNumbers",

@@ -3,7 +3,7 @@
     F = −ρ g V k_b,    M = r × F,    k_b = third row of R_nb             V > 0 lifts
 
 V is the volume displaced beyond that of `buoyancy.net_buoyancy`, behind a pump with its rate limit. The mass of the
-vehicle stays: what is moved is oil between the inside and a bladder, and its shift inside the hull is left out, as is
+vehicle is constant: oil moves between the inside and a bladder. Its shift inside the hull is left out, as is
 the work of the pump against the pressure of the water.
 """
 

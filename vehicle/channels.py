@@ -73,10 +73,11 @@ def table_of(channels: tuple[Channel, ...]) -> np.ndarray:
 def channel_rates(
     state: np.ndarray, command: np.ndarray, table: np.ndarray, count: int, out: np.ndarray
 ) -> None:
-    """Fill the rates of the channels' states, out[STATE_SIZE …]; a state or command without them has none."""
-    for i in range(min(count, state.size - STATE_SIZE, command.size - FIRST_COMMAND)):
+    """Fill the rates of the channels' states, out[STATE_SIZE …]; one that a command does not have is commanded to 0."""
+    for i in range(min(count, state.size - STATE_SIZE)):
         row = table[i]
-        asked = (1.0 - row[LOST]) * command[FIRST_COMMAND + i] + row[OFFSET]
+        given = command[FIRST_COMMAND + i] if FIRST_COMMAND + i < command.size else 0.0
+        asked = (1.0 - row[LOST]) * given + row[OFFSET]
         wanted = max(row[LOW], min(row[HIGH], asked))
         rate = (wanted - state[STATE_SIZE + i]) / max(row[LAG], QUICKEST)
         out[STATE_SIZE + i] = max(-row[RATE_LIMIT], min(row[RATE_LIMIT], rate))

@@ -10,7 +10,7 @@ rolls the hull to starboard wherever the fin points: at γ = 0 it is a starboard
 
 "own" is the state of the fin's channel. r, e and d are the shares in which a fin follows rudder, mean and difference of
 the stern-planes (their angles, behind their servos): 1 for a fin at the tail, 0 for one that has its own command alone;
-r and e are negative for a fin ahead of the hull's centre. So whatever steers a rudder and two planes flies a tail in X.
+r and e are negative for a fin ahead of the hull's centre. So all that steers a rudder and two planes flies a tail in X.
 A share of the command that is lost (`lost_command`) is lost of what a fin follows, too: with 1 it is jammed at its
 offset.
 """

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from subzero.errors import short
+from vehicle.box_sections import HullSection, section_problems
 from vehicle.buoyancy_engine import MOST_ENGINES, NO_ENGINE, BuoyancyEngine
 from vehicle.channels import MOST_CHANNELS, Channel, table_of
 from vehicle.derivatives import derivatives_of, is_table
@@ -18,6 +19,8 @@ from vehicle.fin_list import MOST_FINS, NO_FIN, Fin
 from vehicle.flow_axes import FlowAxes
 from vehicle.moving_mass import MOST_MASSES, NO_MASS, MovingMass
 from vehicle.parameters import Problem, VehicleError, read_section
+from vehicle.products import Race, product_problems
+from vehicle.rigid_body import ProductsOfInertia, inertia_problems
 from vehicle.thrusters import MOST_THRUSTERS, Thruster
 
 if TYPE_CHECKING:
@@ -31,7 +34,13 @@ LISTS: dict[str, tuple[type, int]] = {
     "moving_masses": (MovingMass, MOST_MASSES),
     "buoyancy_engines": (BuoyancyEngine, MOST_ENGINES),
 }
-"""Lists of actuators that a vehicle may have: a table for each by its name; what each is, and how many there may be."""
+"""Lists of actuators that a vehicle may have: a table for each by its name; its kind, and how many there may be."""
+HULL_SECTIONS = "sections"
+"""A table for each section of a hull that is no body of revolution, by its name."""
+FURTHER: dict[str, type] = {"products_of_inertia": ProductsOfInertia, "race": Race}
+"""Sections of numbers that a vehicle need not have, None where it has not."""
+OPTIONAL = (DERIVATIVES, FLOW_AXES, *LISTS, HULL_SECTIONS, *FURTHER)
+"""All sections that a vehicle need not have."""
 FIXED_COMMANDS = ("propeller", "rudder", "stern_plane", "stern_plane_port", "stern_plane_starboard")
 """Names that commands of listed actuators cannot have."""
 
@@ -84,24 +93,25 @@ def _filled(rows: list[Any], empty: Any, most: int) -> tuple[Any, ...]:
 
 
 def read_optional(mapping: Mapping[str, object], problems: list[Problem]) -> dict[str, Any]:
-    """Return what a vehicle need not have, of a mapping: derivatives, flow axes, lists; note their problems."""
+    """Return what a vehicle need not have, of a mapping: derivatives, lists and so on; note their problems."""
     found: dict[str, Any] = {}
-    tables = {name: mapping[name] for name in (DERIVATIVES, FLOW_AXES, *LISTS) if name in mapping}
+    tables = {name: mapping[name] for name in OPTIONAL if name in mapping}
+    rows_of = {name: kind for name, (kind, _) in LISTS.items()} | {HULL_SECTIONS: HullSection}
     for name, table in tables.items():
         if not isinstance(table, Mapping):
-            allowed = f"a table of tables, [{name}.name]" if name in LISTS else "a table of numbers"
+            allowed = f"a table of tables, [{name}.name]" if name in rows_of else "a table of numbers"
             problems.append(Problem(key=name, found=short(table), why="a table is needed", allowed=allowed))
-        elif name in LISTS:
-            kind, _ = LISTS[name]
+        elif kind := rows_of.get(name):
             found[name] = tuple(
                 (str(row), read_section(kind, f"{name}.{row}", values, problems))
                 for row, values in table.items()
             )
-        elif name == FLOW_AXES:
-            found[name] = read_section(FlowAxes, name, table, problems)
+        elif name != DERIVATIVES:
+            found[name] = read_section({FLOW_AXES: FlowAxes, **FURTHER}[name], name, table, problems)
         else:
+            fins = mapping.get("fins")
             try:
-                found[name] = derivatives_of(table)
+                found[name] = derivatives_of(table, tuple(fins) if isinstance(fins, Mapping) else ())
             except VehicleError as error:
                 problems.extend(error.problems)
     return found
@@ -116,7 +126,10 @@ def list_problems(vehicle: Vehicle) -> list[Problem]:
             why, allowed = "this is no such part", f"pairs of a name and a {kind.__module__}.{kind.__name__}"
             return [Problem(key=section, found=short(rows), why=why, allowed=allowed)]
         if len(rows) > most:
-            found, why = f"{len(rows)} {section.replace('_', ' ')}", "so many have no room"
+            found, why = (
+                f"{len(rows)} {section.replace('_', ' ')}",
+                "that is more than the compiled equations hold",
+            )
             problems.append(Problem(key=section, found=found, why=why, allowed=f"up to {most}"))
     problems += [
         Problem(
@@ -131,6 +144,15 @@ def list_problems(vehicle: Vehicle) -> list[Problem]:
     return problems + _channel_problems([channel.name for channel in vehicle.channels])
 
 
+def further_problems(vehicle: Vehicle) -> list[Problem]:
+    """Return the problems of sections of the hull, products of inertia, and of derivatives with fins and race."""
+    return [
+        *section_problems(vehicle.sections),
+        *inertia_problems(vehicle.rigid_body, vehicle.products_of_inertia),
+        *product_problems(vehicle.derivatives, [name for name, _ in vehicle.fins], vehicle.race),
+    ]
+
+
 def _channel_problems(names: list[str]) -> list[Problem]:
     """Return the problems of commands by name: two of one name, too many, one of propeller, rudder or planes."""
     problems = []
@@ -139,6 +161,9 @@ def _channel_problems(names: list[str]) -> list[Problem]:
             why, allowed = "another command has this name", "a name of its own for each actuator"
             problems.append(Problem(key=name, found="this actuator", why=why, allowed=allowed))
     if len(names) > MOST_CHANNELS:
-        found, why = f"{len(names)} commands of listed actuators", "so many have no room"
+        found, why = (
+            f"{len(names)} commands of listed actuators",
+            "that is more than the compiled equations hold",
+        )
         problems.append(Problem(key="channels", found=found, why=why, allowed=f"up to {MOST_CHANNELS}"))
     return problems

@@ -4,7 +4,7 @@
 
 r is the centre of the mass, (x, y, z) that at rest, s how far it has slid and φ how far it has turned (starboard goes
 down), each a channel of its own. The mass is part of `rigid_body.mass`, and its place at rest part of the centre of
-gravity there. So what a move adds is the difference of a point mass m at r and at r₀,
+gravity there. So a move adds the difference of a point mass m at r and at r₀,
 
     ΔM = M_m(r) − M_m(r₀),   Δg = m g (r − r₀) × k_b,        (M + ΔM) ν' = Σ terms − C_ΔM(ν) ν + Δg
 
@@ -13,7 +13,7 @@ with the mass matrix of a point (Fossen 2021, eq. 3.47). Booked on the hull of t
     F = Δg − C_ΔM(ν) ν − ΔM ν'
 
 so that M ν' is the sum of all terms and every joule is found again. A mass that moves is taken to move slowly: the
-momentum m ds/dt that it has relative to the hull is left out, and its own inertia does not turn with it.
+momentum m ds/dt that it has relative to the hull is left out, and the inertia of the mass itself does not turn with it.
 """
 
 from __future__ import annotations

@@ -4,7 +4,8 @@
              m S(r_G)   I_G − m S(r_G)² ]                              (Fossen 2021, eq. 3.47)
 
 about the hull centre; inertias are given about the centre of gravity, so that every positive set is a
-possible body. Products of inertia are left out: a torpedo with its battery amidships has none worth naming.
+possible body. Products of inertia are zero unless a file has a section of them: a torpedo with its battery amidships
+has none worth naming.
 
 Coriolis and centripetal forces follow from the mass matrix alone, by Kirchhoff's equations. With the momenta
 P = M₁₁ v + M₁₂ ω  and  L = M₂₁ v + M₂₂ ω,
@@ -22,8 +23,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from subzero.errors import short
 from subzero.jit import gated_inlined
-from vehicle.parameters import Section, parameter
+from vehicle.parameters import Problem, Section, parameter
 
 
 def skew(vector: np.ndarray) -> np.ndarray:
@@ -59,6 +61,37 @@ class RigidBody(Section):
         inertia = np.diag([self.roll_inertia, self.pitch_inertia, self.yaw_inertia])
         matrix[3:, 3:] = inertia - self.mass * S @ S
         return matrix
+
+
+@dataclass(frozen=True, kw_only=True)
+class ProductsOfInertia(Section):
+    """Products of inertia about axes through the centre of gravity, I_xy = ∫ x y dm; −I_xy stands in the matrix."""
+
+    xy: float = parameter("I_xy", "kg m2")
+    xz: float = parameter("I_xz", "kg m2")
+    yz: float = parameter("I_yz", "kg m2")
+
+    def matrix(self) -> np.ndarray:
+        """Return what they add to M_RB, (6, 6). [kg m2]"""
+        matrix = np.zeros((6, 6))
+        for (i, j), value in zip(((3, 4), (3, 5), (4, 5)), self.values(), strict=True):
+            matrix[i, j] = matrix[j, i] = -value
+        return matrix
+
+
+def inertia_problems(body: RigidBody, products: ProductsOfInertia | None) -> list[Problem]:
+    """Return the problem of products of inertia that no body of these inertias has."""
+    if products is None:
+        return []
+    if not isinstance(products, ProductsOfInertia):
+        why, allowed = "this is no such part", "ProductsOfInertia, or None"
+        return [Problem(key="products_of_inertia", found=short(products), why=why, allowed=allowed)]
+    inertias = np.diag([body.roll_inertia, body.pitch_inertia, body.yaw_inertia])
+    if np.linalg.eigvalsh(inertias + products.matrix()[3:, 3:])[0] > 0.0:
+        return []
+    why = "about some axis the inertia would be negative"
+    allowed = "products that are small against the inertias of the rigid body"
+    return [Problem(key="products_of_inertia", found=short(products.values()), why=why, allowed=allowed)]
 
 
 @gated_inlined

@@ -22,6 +22,7 @@ from subzero.jit import inlined
 from vehicle.added_mass import munk_correction
 from vehicle.axial_drag import axial_drag
 from vehicle.body_lift import body_lift
+from vehicle.box_sections import add_section_drag
 from vehicle.buoyancy_engine import add_engines
 from vehicle.cross_flow import cross_flow_drag
 from vehicle.damping import linear_damping, quadratic_damping
@@ -30,6 +31,7 @@ from vehicle.fin_list import add_fins
 from vehicle.fins import rudder, stern_plane
 from vehicle.flow_axes import add_flow_axes
 from vehicle.moving_mass import add_moving_masses
+from vehicle.products import add_products
 from vehicle.propeller import propeller
 from vehicle.restoring import restoring
 from vehicle.rigid_body import coriolis
@@ -117,6 +119,8 @@ def fill_terms(
     if numbers.winged:
         add_flow_axes(nu_r, numbers.flow_axes, out[4])
     cross_flow_drag(nu_r, numbers.strips, out[5])
+    if numbers.has_sections:
+        add_section_drag(nu_r, numbers.section_strips, out[5])
     axial_drag(nu_r, numbers.axial_drag, out[6])
     linear_damping(nu_r, numbers.linear_damping, out[7])
     quadratic_damping(nu_r, numbers.quadratic_damping, out[8])
@@ -133,6 +137,8 @@ def fill_terms(
         add_fins(state, nu_r, angles, numbers.fins, numbers.fin_count, out[11])
     stern_plane(nu_r, angles[1], -1.0, numbers.stern_planes, out[12])
     stern_plane(nu_r, angles[2], 1.0, numbers.stern_planes, out[13])
+    if numbers.product_count > 0:
+        add_products(state, nu_r, n, angles, numbers, out)
     for i in range(6):
         out[14, i] = wrench_b[i]
     if numbers.mass_count > 0:

@@ -20,6 +20,7 @@ from vehicle.actuators import Servo, Servos
 from vehicle.added_mass import AddedMass
 from vehicle.axial_drag import AxialDrag
 from vehicle.body_lift import BodyLift
+from vehicle.box_sections import HullSection, strips_of
 from vehicle.buoyancy_engine import BuoyancyEngine, EngineNumbers
 from vehicle.channels import Channel
 from vehicle.cross_flow import CrossFlowDrag
@@ -32,8 +33,12 @@ from vehicle.geometry import Hull, TowPoint
 from vehicle.lists import (
     DERIVATIVES,
     FLOW_AXES,
+    FURTHER,
+    HULL_SECTIONS,
     LISTS,
+    OPTIONAL,
     channels_of,
+    further_problems,
     list_problems,
     listed_numbers,
     read_optional,
@@ -41,10 +46,13 @@ from vehicle.lists import (
 from vehicle.motor import Battery, Motor, MotorNumbers, motor_numbers
 from vehicle.moving_mass import MovingMass, MovingMassNumbers
 from vehicle.parameters import Problem, Section, VehicleError, nearest, parameter, read_section
+from vehicle.products import NO_RACE, Race, RaceNumbers, count_of
+from vehicle.products import table_of as product_table_of
 from vehicle.propeller import Propeller, PropellerNumbers
 from vehicle.restoring import Buoyancy, RestoringNumbers
-from vehicle.rigid_body import RigidBody
+from vehicle.rigid_body import ProductsOfInertia, RigidBody
 from vehicle.state import STATE_SIZE
+from vehicle.terms import BREAKDOWN
 from vehicle.thrusters import Thruster, table_of
 
 
@@ -70,6 +78,11 @@ class VehicleNumbers(Record):
     tabled: bool
     linear_table: np.ndarray
     quadratic_table: np.ndarray
+    products: np.ndarray
+    product_count: int
+    race: RaceNumbers
+    has_sections: bool
+    section_strips: np.ndarray
     thrusters: np.ndarray
     thruster_count: int
     channels: np.ndarray
@@ -103,6 +116,9 @@ class Vehicle:
         fins: further fins, such as a tail in X.
         moving_masses: such as a battery that slides and turns.
         buoyancy_engines: such as an oil bladder.
+        sections: by name, of a hull that is no body of revolution, for its cross-flow drag; none for a Myring hull.
+        products_of_inertia: None for none.
+        race: of the propeller, as a factor of derivatives; None where none has it.
     """
 
     water: Water
@@ -130,6 +146,9 @@ class Vehicle:
     fins: tuple[tuple[str, Fin], ...] = ()
     moving_masses: tuple[tuple[str, MovingMass], ...] = ()
     buoyancy_engines: tuple[tuple[str, BuoyancyEngine], ...] = ()
+    sections: tuple[tuple[str, HullSection], ...] = ()
+    products_of_inertia: ProductsOfInertia | None = None
+    race: Race | None = None
 
     def __post_init__(self) -> None:
         """Raise VehicleError for parts that are not valid, or do not fit."""
@@ -140,8 +159,10 @@ class Vehicle:
             for name, kind in {**SECTIONS, FLOW_AXES: FlowAxes, DERIVATIVES: Derivatives}.items()
             if not isinstance(getattr(self, name), kind)
         ]
-        problems = problems or inconsistencies(self.hull, self.added_mass, self.derivatives)
-        problems += list_problems(self)
+        problems = problems or inconsistencies(
+            self.hull, self.added_mass, self.derivatives, self.water.density
+        )
+        problems += list_problems(self) or further_problems(self)
         if problems:
             raise VehicleError(tuple(problems))
 
@@ -149,6 +170,18 @@ class Vehicle:
     def thruster_list(self) -> tuple[Thruster, ...]:
         """The thrusters, in the order of their commands."""
         return tuple(thruster for _, thruster in self.thrusters)
+
+    @property
+    def has_rudder(self) -> bool:
+        """Whether a fin, or a derivative, answers the rudder's command."""
+        listed = any(fin.rudder_share and fin.area for _, fin in self.fins)
+        return self.rudder.area > 0.0 or listed or "rudder" in self.derivatives.factors
+
+    @property
+    def has_stern_planes(self) -> bool:
+        """Whether a fin, or a derivative, answers the commands of the stern-planes."""
+        listed = any(fin.plane_share and fin.area for _, fin in self.fins)
+        return self.stern_planes.area > 0.0 or listed or "stern_plane_port" in self.derivatives.factors
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -179,16 +212,19 @@ class Vehicle:
         return _numbers_of(self)  # not kept as an attribute: a copy with other values would take it along
 
     def _numbers(self) -> VehicleNumbers:
-        density = self.water.density
+        density, length = self.water.density, self.hull.length
         rigid_body, added_mass = self.rigid_body.matrix(), self.added_mass.matrix()
+        if self.products_of_inertia:
+            rigid_body = rigid_body + self.products_of_inertia.matrix()
         if self.derivatives:
-            added_mass = added_mass + self.derivatives.added_mass
+            added_mass = added_mass + self.derivatives.added_mass(density, length)
         mass_matrix = rigid_body + added_mass
+        rows = self.derivatives.with_dimensions(density, length)
         return VehicleNumbers(
             mass_matrix=mass_matrix,
             inverse_mass=np.linalg.inv(mass_matrix),
             rigid_body=rigid_body,
-            added_mass=added_mass,
+            added_mass=0.0 * added_mass if self.derivatives.is_complete else added_mass,
             munk_excess=self.added_mass.munk_factor - 1.0,
             body_lift=self.body_lift.numbers(),
             strips=self.cross_flow_drag.numbers(self.hull, density),
@@ -206,8 +242,13 @@ class Vehicle:
             ),
             motor=motor_numbers(self.motor, self.battery),
             tabled=bool(self.derivatives),
-            linear_table=self.derivatives.linear,
-            quadratic_table=self.derivatives.quadratic,
+            linear_table=self.derivatives.linear(density, length),
+            quadratic_table=self.derivatives.quadratic(density, length),
+            products=product_table_of(rows, self.derivatives.named, _PLACES),
+            product_count=count_of(rows),
+            race=self.race.numbers() if self.race else NO_RACE,
+            has_sections=bool(self.sections),
+            section_strips=strips_of(tuple(section for _, section in self.sections), density),
             thrusters=table_of(self.thruster_list),
             thruster_count=len(self.thrusters),
             winged=self.flow_axes != NO_FLOW_AXES,
@@ -224,6 +265,9 @@ class Vehicle:
             table = table.setdefault(section, {})
         table[name] = value
         return from_mapping(mapping)
+
+
+_PLACES = {name: i for i, name in enumerate(BREAKDOWN)}
 
 
 @lru_cache(maxsize=4)
@@ -283,9 +327,12 @@ def to_mapping(vehicle: Vehicle) -> dict[str, dict[str, Any]]:
         mapping[DERIVATIVES] = dict(vehicle.derivatives.table)
     if vehicle.flow_axes != NO_FLOW_AXES:
         mapping[FLOW_AXES] = vehicle.flow_axes.by_name()
-    for section in LISTS:
+    for section in (*LISTS, HULL_SECTIONS):
         if rows := getattr(vehicle, section):
             mapping[section] = {name: part.by_name() for name, part in rows}
+    for section in FURTHER:
+        if part := getattr(vehicle, section):
+            mapping[section] = part.by_name()
     return mapping
 
 
@@ -301,10 +348,10 @@ def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
             key=str(name),
             found="this table",
             why="no such section",
-            allowed=nearest(name, [*SECTIONS, *LISTS, DERIVATIVES, FLOW_AXES]),
+            allowed=nearest(name, [*SECTIONS, *OPTIONAL]),
         )
         for name in mapping
-        if name not in (*SECTIONS, *LISTS, DERIVATIVES, FLOW_AXES)
+        if name not in {*SECTIONS, *OPTIONAL}
     ]
     sections: dict[str, Any] = read_optional(mapping, problems)
     for name, kind in SECTIONS.items():
@@ -320,11 +367,12 @@ def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
 
 
 def inconsistencies(
-    hull: Hull, added_mass: AddedMass, derivatives: Derivatives = NO_DERIVATIVES
+    hull: Hull, added_mass: AddedMass, derivatives: Derivatives, density: float
 ) -> list[Problem]:
     """Return the inconsistencies between numbers that are valid by themselves."""
     problems = []
-    if derivatives and np.linalg.eigvalsh(added_mass.matrix() + derivatives.added_mass)[0] < -1e-9:
+    tabled = derivatives.added_mass(density, hull.length) if derivatives else np.zeros((6, 6))
+    if derivatives and np.linalg.eigvalsh(added_mass.matrix() + tabled)[0] < -1e-9:
         why = "the added mass would give negative kinetic energy"
         allowed = "a matrix without negative eigenvalues"
         problems.append(Problem(key=DERIVATIVES, found="its couplings", why=why, allowed=allowed))

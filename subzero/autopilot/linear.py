@@ -28,7 +28,6 @@ from subzero.autopilot.cable_modes import BENDS, CableModes
 from subzero.errors import UserError, suggestion
 from subzero.model import Model
 from subzero.steady_motion.hull_state_space import (
-    INPUT_NAMES,
     STATE_NAMES,
     VELOCITY,
     ideal,

@@ -259,8 +259,8 @@ def extended_run(
                 "--effects says what an extended model is made of. Give the model too: --with FILE."
             )
         return trial, {}
-    from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.hypothesis.catalogue import with_own
+    from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.hypothesis.hypotheses import apply_extended, unseen
     from subzero.diagnosis.report.toml_file import read_extended
     from subzero.model import Model

@@ -189,9 +189,7 @@ def write_all(
     sources = ", ".join(trial.record.source for trial in logged)
     own = effects_file.name if effects_file is not None else None
     known = all_effects(with_own(effects, logged[0].setting.model.vehicle))
-    extended = text_of(
-        verdict.extended, logged[0].setting, effects=known, effects_file=own, source=sources
-    )
+    extended = text_of(verdict.extended, logged[0].setting, effects=known, effects_file=own, source=sources)
     _write(output_folder, "extended.toml", extended)
     reported = {trial.name: _about(trial) for trial in logged}
     _write(output_folder, "diagnosis.json", json_file.text(verdict, reported, logged[0].setting.trial.source))

@@ -410,8 +410,8 @@ def _check_fins(start: scenarios.Start, model: Model) -> None:
 
 def _steady(trial: scenarios.Trial, model: Model, tethered: bool) -> np.ndarray:
     """Return the state of a trial that starts in trim."""
-    from subzero.steady_motion.hull_state_space import to_vehicle
     from subzero.steady_motion.asked import Asked
+    from subzero.steady_motion.hull_state_space import to_vehicle
     from subzero.steady_motion.trim_point import steady_motion
 
     start, water = trial.start, _water_at_the_start(model, trial.start.depth)

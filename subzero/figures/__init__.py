@@ -9,6 +9,7 @@ Inside `page_width` they are as narrow as a column of a page.
 
 from __future__ import annotations
 
+import json
 from typing import TYPE_CHECKING
 
 from subzero.arguments import check_is_run, checked_arguments
@@ -72,16 +73,25 @@ def draw(runs: Runs | xr.Dataset, record: Record | None = None) -> dict[str, Fig
 
 def _commanded(runs: Runs, record: Record | None, title: Title) -> dict[str, Figure]:
     """Return the figures of a vehicle that follows commands."""
-    if "thruster_command" in next(iter(runs.values())):
-        figures = {"station": station(runs, record, title)}
-    else:
-        figures = {"fig6": figure_6(runs, record, title), "attitude": attitude(runs, record, title)}
+    run = next(iter(runs.values()))
+    has_propeller = _has_propeller(run)
+    figures: dict[str, Figure] = {}
+    if has_propeller:
+        figures |= {"fig6": figure_6(runs, record, title), "attitude": attitude(runs, record, title)}
+    if "thruster_command" in run or not has_propeller:
+        figures["station"] = station(runs, record, title)
     if drawn := actuators(runs, title):
         figures["actuators"] = drawn
     if "tethered" in runs:
         figures |= _cable(runs["tethered"], title)
-    figures["forces"] = forces(runs.get("tethered", next(iter(runs.values()))), title)
+    figures["forces"] = forces(runs.get("tethered", run), title)
     return figures
+
+
+def _has_propeller(run: xr.Dataset) -> bool:
+    """Return whether the vehicle of a run has a propeller; those of a run that does not say so have one."""
+    propeller = json.loads(run.attrs["parameters"])["vehicle"].get("propeller", {})
+    return bool(propeller.get("thrust_constant", 1.0) > 0.0)
 
 
 def _prescribed(runs: Runs, title: Title) -> dict[str, Figure]:

@@ -88,22 +88,30 @@ STATION = {
 
 
 def station(runs: Runs, record: Record | None, title: Title) -> Figure:
-    """Draw a vehicle of thrusters: its place, heading and pitch, and the commands of its thrusters, of one run."""
+    """Draw place, heading and pitch; and the commands of the thrusters of one run, or the roll where there are none."""
     figure, panels = sheet(3, 2, title)
-    for axes, (name, words) in zip(panels[:5], STATION.items(), strict=True):
+    has_thrusters = "thruster_command" in next(iter(runs.values()))
+    shown = STATION if has_thrusters else STATION | {"roll_angle": ATTITUDE["roll_angle"]}
+    for axes, (name, words) in zip(panels, shown.items(), strict=False):
         channel_panel(axes, runs, name, record)
         headline(axes, words)
     panels[2].invert_yaxis()
-    which, run = next(iter(runs.items()))
-    for name, command in zip(run["thruster"].values, run["thruster_command"].values.T, strict=True):
-        panels[5].plot(run["time"].values, command, linewidth=0.8, label=str(name).replace("_", " "))
-    label(panels[5], None, "share of full command [-]")
-    headline(panels[5], f"Thrusters, {which}")
-    in_time(panels[5], runs)
-    legend(panels[5], columns=2)
+    if has_thrusters:
+        _thrusters(panels[5], runs)
     legend(panels[0])
     time_label(panels, 2)
     return figure
+
+
+def _thrusters(axes: Axes, runs: Runs) -> None:
+    """Draw the commands of the thrusters of the first run."""
+    which, run = next(iter(runs.items()))
+    for name, command in zip(run["thruster"].values, run["thruster_command"].values.T, strict=True):
+        axes.plot(run["time"].values, command, linewidth=0.8, label=str(name).replace("_", " "))
+    label(axes, None, "share of full command [-]")
+    headline(axes, f"Thrusters, {which}")
+    in_time(axes, runs)
+    legend(axes, columns=2)
 
 
 def actuators(runs: Runs, title: Title) -> Figure | None:

@@ -298,8 +298,9 @@ def channel_panel(axes: Axes, runs: Runs, name: str, record: Record | None = Non
     if record is not None and name in record.values:
         axes.plot(record.time, record.values[name], label="measured", zorder=1.5, **DOTS)
     label(axes, None, f"${channel.symbol}$ [{channel.unit}]")
+    axes.ticklabel_format(axis="y", scilimits=(-3, 5), useMathText=True)
     in_time(axes, runs)
-    calm(axes, smallest=1e-3)
+    calm(axes, smallest=1e-6 if channel.unit == "m3" else 1e-3)
 
 
 def in_time(axes: Axes, runs: Runs) -> None:

@@ -30,7 +30,7 @@ FIGURES = {
     "fig5": "Tension, force and tow-point velocities of a turn",
     "fig6": "Propeller command, forward speed, rudder and heading over time",
     "attitude": "Actuators and attitude over time",
-    "station": "Place, heading and thrusters over time",
+    "station": "Place, heading and attitude over time, and thrusters",
     "actuators": "Fins, moving masses and buoyancy engines of the vehicle's lists, commanded and moved",
     "cable": "Shape of the cable, and tension along it",
     "tension": "Tension along the cable over time, and between which values it has been",

@@ -280,16 +280,23 @@ def _with_listed_commands(record: Record, trial: scenarios.Trial) -> scenarios.T
     zero = scenarios.Commands(time=np.zeros(1), values=np.zeros((1, len(REPORTED_COMMANDS))))
     others = trial.commands or zero
     four = [_column(record, name, at, others) for at, name in enumerate(REPORTED_COMMANDS)]
-    listed = [held(record.time[known], column[known], record.time)
-              for column in record.listed.values() for known in [np.isfinite(column)]]
+    listed = [
+        held(record.time[known], column[known], record.time)
+        for column in record.listed.values()
+        for known in [np.isfinite(column)]
+    ]
     commands = _new_commands(record, [*four, *listed], tuple(record.listed))
     try:
         return dataclasses.replace(trial, commands=commands, motion=None, station=None)
     except scenarios.ScenarioError as error:
-        raise UserError(f"{record.source}: its commands are not those of the vehicle of {trial.name}. {error}") from None
+        raise UserError(
+            f"{record.source}: its commands are not those of the vehicle of {trial.name}. {error}"
+        ) from None
 
 
-def _new_commands(record: Record, columns: list[np.ndarray], listed: tuple[str, ...] = ()) -> scenarios.Commands:
+def _new_commands(
+    record: Record, columns: list[np.ndarray], listed: tuple[str, ...] = ()
+) -> scenarios.Commands:
     """Return commands at the times at which they change."""
     values = np.column_stack(columns)
     new = np.flatnonzero(np.r_[True, np.any(np.diff(values, axis=0) != 0.0, axis=1)])

@@ -251,8 +251,8 @@ class Simulator:
         """Raise an error for commands to thrusters that keep a station: they would not be heard."""
         if self.trial.station is not None and any(numbers[len(FOUR) :]):
             raise CommandError(
-                f"At t = {self.time:g} s thrusters are commanded that keep the station of '{self.trial.name}'. Give four"
-                " numbers, or take dataclasses.replace(trial, station=None)."
+                f"At t = {self.time:g} s thrusters are commanded that keep the station of '{self.trial.name}'. Give"
+                " four numbers, or take dataclasses.replace(trial, station=None)."
             )
 
     def _command_at(self, time: float) -> list[float]:

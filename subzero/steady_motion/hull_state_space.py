@@ -162,7 +162,7 @@ class Demand(NamedTuple):
 
 def ideal(hull: Vehicle) -> Vehicle:
     """Return a vehicle whose actuators have no limit, dead band, offset, play or sag; lags remain (none:
-    `QUICKEST`). Listed actuators are as quick as their lags, and else as they are.
+    `QUICKEST`). Listed actuators are as quick as their lags.
     """
 
     def servo(servo: Servo) -> Servo:
@@ -182,15 +182,20 @@ def ideal(hull: Vehicle) -> Vehicle:
         rudder_servo=servo(hull.rudder_servo),
         stern_plane_port_servo=servo(hull.stern_plane_port_servo),
         stern_plane_starboard_servo=servo(hull.stern_plane_starboard_servo),
-        **{name: _quick(getattr(hull, name)) for name in ("fins", "moving_masses", "buoyancy_engines")},
+        fins=_quick(hull.fins),
+        moving_masses=_quick(hull.moving_masses),
+        buoyancy_engines=_quick(hull.buoyancy_engines),
     )
 
 
 def _quick(listed: tuple[tuple[str, Any], ...]) -> tuple[tuple[str, Any], ...]:
-    """Return listed actuators without a limit of their rates."""
-    rates = ("rate_limit", "slide_rate", "turn_rate", "pump_rate")
+    """Return listed actuators without a limit of their rates; fins turn as far as a half circle."""
+    free = dict.fromkeys(("rate_limit", "slide_rate", "turn_rate", "pump_rate"), inf) | {
+        "deflection_limit": pi
+    }
     return tuple(
-        (name, replace(part, **{each: inf for each in rates if hasattr(part, each)})) for name, part in listed
+        (name, replace(part, **{key: value for key, value in free.items() if hasattr(part, key)}))
+        for name, part in listed
     )
 
 

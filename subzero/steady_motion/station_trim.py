@@ -22,9 +22,7 @@ from subzero.steady_motion.trim_point import Trim, steady_motion
 from vehicle import rotation
 
 
-def station_trim(
-    trial: scenarios.Trial, model: Model | None = None, *, tethered: bool = True
-) -> Trim:
+def station_trim(trial: scenarios.Trial, model: Model | None = None, *, tethered: bool = True) -> Trim:
     """Return the steady state in which thrusters keep the first place and heading of a trial's [station].
 
     Args:
@@ -51,9 +49,7 @@ def station_trim(
         )
     heading, place = station.heading[0], np.array(station.place[0])
     past = -model.water().at(tuple(place)) @ _earth_axes(np.zeros(16), heading)
-    asked = Asked(
-        speed=float(past[0]), sway_speed=float(past[1]), depth_rate=float(past[2]), wet_length=wet
-    )
+    asked = Asked(speed=float(past[0]), sway_speed=float(past[1]), depth_rate=float(past[2]), wet_length=wet)
     pull = partial(_held_pull, model, trial, place, heading)
     steady = steady_motion(model, asked, pull)
     state = steady.state.copy()
@@ -72,7 +68,7 @@ def _earth_axes(x: np.ndarray, heading: float) -> np.ndarray:
 def _held_pull(
     model: Model, trial: scenarios.Trial, place: np.ndarray, heading: float, x: np.ndarray, asked: Asked
 ) -> np.ndarray:
-    """Return the wrench (6,) of the tether at rest between the drum and the tow point of a state, body axes. [N, N m]"""
+    """Return the wrench (6,) of the tether at rest between drum and tow point of a state, body axes. [N, N m]"""
     start, arm = trial.start, model.vehicle.tow_point.position()
     begins = np.zeros(16)
     begins[3:5] = start.roll, start.pitch

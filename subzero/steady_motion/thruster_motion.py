@@ -96,7 +96,7 @@ class ThrusterMotion:
         hull: whose thrusters.
         numbers: of the hull, its actuators without limits.
         free: axes that its thrusters do not hold: the motion along them is unknown.
-        pull, extra: of the cable, and what is added to it.
+        pull, extra: of the cable, and a part added to it.
     """
 
     asked: Asked

@@ -10,27 +10,25 @@ current only carries the track.
 A motion that is impossible is refused with the reason, and the largest motion that is possible (`NoTrimError`).
 
 The force of the cable is that of `subzero.steady_motion.steady_pull`. A vehicle on thrusters has other unknowns
-(`thruster_motion`), and may stand still.
+(`thruster_motion`), and may stand still; a glider has, too (`glider_motion`), and must sink or rise.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from math import ceil, cos, degrees, floor, radians, sin, sqrt
+from dataclasses import dataclass, replace
+from math import ceil, floor
 from typing import NoReturn
 
 import numpy as np
 
-from subzero.errors import UserError, real, short
 from subzero.files.text_repr import Overview
 from subzero.model import Model
 from subzero.steady_motion.asked import FASTEST, Asked, NoTrimError
+from subzero.steady_motion.glider_motion import GliderMotion, channel_demands, is_glider
+from subzero.steady_motion.glider_motion import refusal as glider_refusal
 from subzero.steady_motion.hull_state_space import (
     ACTUATORS,
-    DEPTH,
-    PITCH,
-    ROLL,
     STATE_NAMES,
     SURGE,
     VELOCITY,
@@ -39,18 +37,17 @@ from subzero.steady_motion.hull_state_space import (
     demands,
     ideal,
     listed_commands,
-    rate,
     resting_state,
     thruster_demands,
 )
 from subzero.steady_motion.propeller_motion import Motion
 from subzero.steady_motion.steady_pull import SteadyPull
 from subzero.steady_motion.thruster_motion import ThrusterMotion, is_on_thrusters, refusal
-from vehicle import Vehicle, VehicleNumbers
+from vehicle import Vehicle
 
 RESIDUAL = 1e-9
 """Tolerances of accelerations and depth rate. [m/s2, rad/s2, m/s]"""
-AnyMotion = Motion | ThrusterMotion
+AnyMotion = Motion | ThrusterMotion | GliderMotion
 
 
 def solved(motion: AnyMotion, y: np.ndarray) -> np.ndarray | None:
@@ -127,7 +124,11 @@ class Trim:
             ("fins", f"rudder {rudder:.4g} degree", f"stern-planes {port:.4g} and {starboard:.4g} degree"),
             ("cable", f"{self.wet_length:.4g} m", f"pulls {np.linalg.norm(self.wrench[:3]):.4g} N"),
         ]
-        listed = [f"{name} {x:.4g}" for name, x in zip(self.listed, self.command[4:], strict=True) if abs(x) > RESIDUAL]
+        listed = [
+            f"{name} {x:.4g}"
+            for name, x in zip(self.listed, self.command[4:], strict=True)
+            if abs(x) > RESIDUAL
+        ]
         rows += [("listed", *listed)] if listed else []
         return Overview("Steady motion", rows).text()
 
@@ -148,8 +149,9 @@ def steady_motion(model: Model, asked: Asked, pull_of: Pull | None = None) -> Tr
         NoTrimError: there is none: which limit is hit, and how far one can go.
         UserError: the pull cannot be had.
     """
-    if is_on_thrusters(model.vehicle):
-        if refused := refusal(model.vehicle, asked):
+    if is_on_thrusters(model.vehicle) or is_glider(model.vehicle):
+        is_driven = is_on_thrusters(model.vehicle)
+        if refused := refusal(model.vehicle, asked) if is_driven else glider_refusal(asked):
             raise NoTrimError(f"There is no steady motion of this vehicle: {refused}.")
     elif not model.vehicle.propeller.thrust_constant > 0.0:
         raise NoTrimError("There is no steady motion of this vehicle: it has no propeller and no thrusters.")
@@ -158,7 +160,7 @@ def steady_motion(model: Model, asked: Asked, pull_of: Pull | None = None) -> Tr
     try:
         return _trim(model, asked, pull_of)
     except NoTrimError as error:
-        slowest, most = held_speeds(model, asked.wet_length)
+        slowest, most = (0.0, 0.0) if is_glider(model.vehicle) else held_speeds(model, asked.wet_length)
         if slowest <= asked.speed <= most or not most:
             raise
         behind = f" on {asked.wet_length:g} m of cable" if asked.wet_length else ""
@@ -230,18 +232,22 @@ def _motion(hull: Vehicle, asked: Asked, pull: SteadyPull) -> AnyMotion:
     numbers = ideal(hull).numbers()
     if is_on_thrusters(hull):
         return ThrusterMotion.of(asked, hull, numbers, pull)
+    if is_glider(hull):
+        return GliderMotion.of(asked, hull, numbers, pull)
     return Motion(asked=asked, numbers=numbers, rest=resting_state(hull), pull=pull, extra=np.zeros(6))
 
 
 def _commands(hull: Vehicle, x: np.ndarray) -> np.ndarray:
     """Return the commands that lead to the actuators of a state."""
-    if is_on_thrusters(hull):
+    if is_on_thrusters(hull) or is_glider(hull):
         return np.array([0.0] * 4 + listed_commands(hull, x))
     return commands(hull, x)
 
 
 def _demands(hull: Vehicle, x: np.ndarray) -> list[Demand]:
     """Return the demands of a state on the actuators that drive a vehicle."""
+    if is_glider(hull):
+        return channel_demands(hull, x)
     return thruster_demands(hull, x) if is_on_thrusters(hull) else demands(hull, x)
 
 

@@ -13,8 +13,8 @@ import pytest
 
 import subzero
 from subzero import autopilot
-from subzero.autopilot.helm import FinHelm
 from subzero.autopilot import Wanted
+from subzero.autopilot.helm import FinHelm
 from subzero.autopilot.manoeuvres import VerticalZigZag, ZigZag
 from subzero.autopilot.stability_margins import check_stable
 from subzero.cli.app import MISTAKE, main

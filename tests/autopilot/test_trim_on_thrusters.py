@@ -122,7 +122,10 @@ def test_the_coupled_run_ends_at_its_trim_on_station():
     steady = autopilot.station_trim(HOVER)
     thrust = run["force_breakdown"].sel(term="propeller").values[-1]
     pitch = np.radians(float(run["pitch"].values[-1]))  # held level by no integral: the moments leave some
-    ahead, down = thrust[0] * np.cos(pitch) + thrust[2] * np.sin(pitch), thrust[2] * np.cos(pitch) - thrust[0] * np.sin(pitch)
+    ahead, down = (
+        thrust[0] * np.cos(pitch) + thrust[2] * np.sin(pitch),
+        thrust[2] * np.cos(pitch) - thrust[0] * np.sin(pitch),
+    )
     assert_allclose([ahead, down], wrench_of(steady)[[0, 2]], atol=0.02 * abs(thrust[0]))
     assert np.abs(steady.command[4:]).max() > 0.2
     bare = autopilot.station_trim(HOVER, tethered=False)
@@ -130,7 +133,9 @@ def test_the_coupled_run_ends_at_its_trim_on_station():
 
 
 def test_what_cannot_be_held_is_refused_with_the_limit():
-    with pytest.raises(autopilot.NoTrimError, match=r"the thruster \w+ would need .* of full command, its limit is 1"):
+    with pytest.raises(
+        autopilot.NoTrimError, match=r"the thruster \w+ would need .* of full command, its limit is 1"
+    ):
         autopilot.trim(ROV, speed=2.0)
     with pytest.raises(autopilot.NoTrimError, match=r"Straight ahead the hull holds 0\.73\d m/s at most"):
         autopilot.trim(ROV, speed=2.0)

@@ -15,6 +15,14 @@ PAGE = (Path(__file__).parents[2] / "docs" / "vehicles.md").read_text(encoding="
 TOML = re.findall(r"```toml\n(.*?)```", PAGE, re.DOTALL)
 
 
+def block(start):
+    """Return the file on the page that begins so."""
+    return next(text for text in TOML if text.startswith(start))
+
+
+ROV = block('base = "open_frame"') + block("[thrusters")
+
+
 def test_the_commands_of_a_torpedo_from_four_numbers(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     for line in re.findall(r"```sh\n(.*?)```", PAGE, re.DOTALL)[0:2]:
@@ -35,9 +43,9 @@ def test_a_torpedo_that_cannot_be_leaves_nothing_behind(tmp_path, monkeypatch, c
 
 
 def test_the_files_of_the_page_are_files(tmp_path):
-    few, derivatives, thruster, station = TOML
+    few, station = block('base = "torpedo"'), block("[station]")
     (tmp_path / "few.toml").write_text(few)
-    (tmp_path / "rov.toml").write_text(derivatives + thruster)
+    (tmp_path / "rov.toml").write_text(ROV)
     assert len(contents(str(tmp_path / "few.toml")).numbers) == 118
     names = {number.name for number in contents(str(tmp_path / "rov.toml")).numbers}
     assert {"vehicle.derivatives.N_v", "vehicle.thrusters.front_port.lag"} <= names
@@ -48,18 +56,28 @@ def test_the_files_of_the_page_are_files(tmp_path):
     assert trial.station.heading[-1] == pytest.approx(3.14159, abs=1e-4)
 
 
+def test_products_primed_derivatives_and_sections_of_the_page_are_a_vehicle(tmp_path):
+    text = 'base = "open_frame"\n' + block("[derivatives]") + block("[sections")
+    (tmp_path / "box.toml").write_text(text)
+    names = {number.name: number.unit for number in contents(str(tmp_path / "box.toml")).numbers}
+    assert names["vehicle.derivatives.Y_v'"] == "1"
+    assert names["vehicle.derivatives.X_uu_rudder2"] == "kg/m"
+    assert names["vehicle.sections.bow.height"] == "m"
+    assert main(("validate", str(tmp_path / "box.toml"))) == 0
+
+
 @pytest.mark.parametrize(
     "change, said",
     [
         (("base = ", "bose = "), "numbers of a vehicle are missing"),
-        (("X_u = ", "X_q7 = "), "no such key"),
+        (("X_u = ", "X_q7 = "), "no such derivative"),
         (('unit = "kg/s"', 'unit = "kg"'), 'unit = "kg/s"'),
         (("thrust_ahead = ", "thrust_forward = "), "Did you mean 'thrusters.front_port."),
         (("thrust_ahead = { value = 30.4", "thrust_ahead = { value = -1.0"), "thrust at full command ahead"),
     ],
 )
 def test_a_slip_in_a_table_is_said_with_its_line(tmp_path, capsys, change, said):
-    (tmp_path / "rov.toml").write_text((TOML[1] + TOML[2]).replace(*change))
+    (tmp_path / "rov.toml").write_text(ROV.replace(*change))
     assert main(("validate", str(tmp_path / "rov.toml"))) == 2
     message = capsys.readouterr().err
     assert said in message

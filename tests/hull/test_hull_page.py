@@ -69,18 +69,25 @@ def inputs(seed):
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("changes", CHANGED)
-@pytest.mark.parametrize("name", ["subzero2", "remus100", "bluerov2_heavy"])
+@pytest.mark.parametrize(
+    "name", ["subzero2", "remus100", "bluerov2_heavy", "xfin_auv", "seawing", "nps_auv2"]
+)
 def test_the_page_is_the_hull(name, changes, seed):
     numbers = numbers_of(name)
-    own = (
-        CHANGED[changes] if name != "bluerov2_heavy" else {}
-    )  # its added mass is in a table, its fins are none
+    in_tables = name in (
+        "bluerov2_heavy",
+        "seawing",
+        "nps_auv2",
+    )  # their added mass is in a table, their fins are none
+    own = {} if in_tables else CHANGED[changes]
     for section, values in own.items():
         numbers[section] |= values
     hull = vehicle.from_mapping(numbers)
     state, command, current, wrench = inputs(seed)
-    shares = np.random.default_rng(seed).uniform(-1.1, 1.1, (2, len(hull.thrusters)))
-    state, command = np.append(state, shares[0]), np.append(command, shares[1])
+    rng, most = np.random.default_rng(seed), [channel.high for channel in hull.channels]
+    state, command = (
+        np.append(values, rng.uniform(-1.1, 1.1, len(most)) * most) for values in (state, command)
+    )
     terms, rates = page()["forces"](vehicle.to_mapping(hull), state, command, current, wrench)
     compiled = vehicle.breakdown_table(hull, state, command, current_n=current, wrench_b=wrench)
     assert list(terms) == list(compiled) == [term.name for term in vehicle.TERMS]

@@ -311,7 +311,11 @@ def test_mappings_carry_the_lists_and_flow_axes():
     ("section", "rows", "said"),
     [
         ("fins", (("rudder", CROSS.fins[0][1]),), "another command has this name"),
-        ("fins", tuple((f"fin_{i}", CROSS.fins[0][1]) for i in range(9)), "so many have no room"),
+        (
+            "fins",
+            tuple((f"fin_{i}", CROSS.fins[0][1]) for i in range(9)),
+            "more than the compiled equations hold",
+        ),
         ("moving_masses", (("battery", BLADDER),), "this is no such part"),
         ("buoyancy_engines", BLADDER, "this is no such part"),
     ],

@@ -161,7 +161,7 @@ def test_a_table_of_derivatives_in_and_the_shipped_remus_out():
     "table, said",
     [
         ((("X_a", -1.0),), "no such derivative"),
-        ((("X_uv", -1.0),), "no such derivative"),
+        ((("X_uuu", -1.0),), "no such derivative"),
         ((("X_u", 1.0),), "it would drive the hull"),
         ((("X_u", "much"),), "not a finite number"),
         ((("Y_rdot", 1.0),), "added mass is symmetric"),
@@ -176,7 +176,7 @@ def test_names_of_derivatives():
     assert place_of("X_u") == ("linear", 0, 0)
     assert place_of("N_v|v|") == place_of("N_vv") == ("quadratic", 5, 1)
     assert place_of("M_wdot") == ("added_mass", 4, 2)
-    assert place_of("X_uw") is None
+    assert place_of("X_uw") is None  # of no matrix: a product
 
 
 def test_a_thruster_without_direction_and_too_many_of_them_are_refused():

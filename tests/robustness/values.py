@@ -31,10 +31,10 @@ from hypothesis import strategies as st
 import cable
 import scenarios
 import subzero
+from scenarios.parameters import with_vehicle
 from subzero import autopilot
 from subzero.external_force import MissingForce, Term
-from vehicle import Vehicle
-from vehicle.thrusters import Thruster
+from vehicle import Vehicle, from_mapping
 
 ROWS = 5
 """So many results of a run are enough to see whether it stands."""
@@ -195,7 +195,16 @@ TUNING = autopilot.tune(MODEL, speeds=(0.8, 1.2))
 SPEED = np.array([0.0, 1.0, 2.0])
 
 
-THRUSTER = subzero.Model.of(subzero.load_scenario("rov_hover")).vehicle.thruster_list[0]
+LISTED = {
+    section: getattr(from_mapping(with_vehicle(FIG6, name)[0].vehicle), section)[0][1]
+    for section, name in (
+        ("thrusters", "bluerov2_heavy"),
+        ("fins", "xfin_auv"),
+        ("moving_masses", "seawing"),
+        ("buoyancy_engines", "seawing"),
+    )
+}
+"""A listed actuator of each kind."""
 
 
 def fields_of(value: Any) -> dict[str, Any]:
@@ -430,9 +439,10 @@ def targets() -> list[Target]:
         Target("manoeuvre", {"name": "crash_stop", "size": 1.0, "speed": 1.0}, manoeuvred),
     ]  # fmt: skip
     for name, section in fields_of(MODEL.vehicle).items():
-        if name != "thrusters":  # a table of its own, below
+        if name not in LISTED:  # tables, below
             found.append(made(type(section), section, with_section(name)))
-    found.append(made(Thruster, THRUSTER, lambda thruster: with_section("thrusters")((("one", thruster),))))
+    for name, part in LISTED.items():
+        found.append(made(type(part), part, lambda part, name=name: with_section(name)((("first", part),))))
     return found
 
 

@@ -222,3 +222,40 @@ def test_a_copy_of_subzero_with_another_length_and_mass_is_doubted_and_real_vehi
     for word in ("displaces", "shorter hull", "pitch_inertia", "added_mass.sway", "added_mass.yaw"):
         assert word in said
     assert not np.isnan(typed_in.rigid_body.mass)
+
+
+ROUND = "length_m = 2.0\ndiameter_m = 0.2\nmass_kg = 45.0\nspeed_m_s = 1.8\n"
+
+
+def test_a_tail_in_x_reaches_the_same_speed_and_turns_as_the_cross(tmp_path):
+    """Fins of one shape: the torpedo's rudders and stern-planes are alike."""
+    cross = made(tmp_path, ROUND)
+    rps = speed_command(command_numbers(tmp_path / "auv.toml"), 1.8)
+    turned = made(tmp_path, ROUND + "tail_angle_deg = 45")
+    assert speed_command(command_numbers(tmp_path / "auv.toml"), 1.8) == pytest.approx(rps, rel=1e-12)
+    assert [name for name, _ in turned.fins] == [
+        "lower_starboard",
+        "lower_port",
+        "upper_port",
+        "upper_starboard",
+    ]
+    assert all(np.hypot(fin.y, fin.z) == pytest.approx(cross.rudder.arm) for _, fin in turned.fins)
+    for rudder, planes in ((0.05, 0.0), (0.0, 0.05)):
+        ends = []
+        for hull in (cross, turned):
+            start = initial_state(velocity=(1.8, 0, 0, 0, 0, 0), propeller_speed=rps)
+            ends.append(free_run(hull, start, [rps, rudder, planes, planes], 3.0).states[-1])
+        component = 12 if rudder else 11  # yaw or pitch rate
+        assert ends[1][component] == pytest.approx(ends[0][component], rel=0.02)
+        assert ends[0][component] > 0.01
+
+
+def test_own_numbers_of_a_fin_stand_and_a_vehicle_of_ten_numbers_ships(tmp_path):
+    jammed = 'lost_command = { value = 1.0, unit = "1" }\noffset = { value = 0.1, unit = "rad" }'
+    hull = made(tmp_path, ROUND + "tail_angle_deg = 45", f"[fins.upper_port]\n{jammed}")
+    fins = dict(hull.fins)
+    assert fins["upper_port"].lost_command == 1.0 != fins["upper_starboard"].lost_command
+    assert fins["upper_port"].offset == 0.1
+    shipped = with_vehicle(load("fig6"), "xfin_auv")[0].vehicle
+    assert len(shipped["fins"]) == 4
+    assert contradictions(from_mapping(shipped)) == []

@@ -74,7 +74,9 @@ def pose(records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
     effects = [
         replace(effect, parameters=tuple(parameter.within(nominal) for parameter in effect.parameters))
         for effect in (with_tolerances(trial, nominal) for trial in catalogue(channels, more).values())
-        if _possible(effect, observed) and not _is_absent(effect, nominal) and not moves_nothing(effect, nominal)
+        if _possible(effect, observed)
+        and not _is_absent(effect, nominal)
+        and not moves_nothing(effect, nominal)
     ]
     onsets = tuple(
         effect for effect in ONSETS if _possible(effect, observed) and not _is_absent(effect, nominal)

@@ -65,7 +65,7 @@ def _lost_command(section: str, name: str, part: Any) -> Effect:
 
 
 def _with_lost_command(section: str, name: str, setting: Setting, share: float) -> Setting:
-    """c + share, of one actuator."""
+    """C + share, of one actuator."""
     old = dict(getattr(setting.model.vehicle, section))[name].lost_command
     return setting.with_listed(section, name, lost_command=old + share)
 
