@@ -68,10 +68,6 @@ class Thruster(Section):
         arm = np.cross([self.x, self.y, self.z], self.direction) + self.reaction_arm * self.direction
         return np.concatenate([self.direction, arm])
 
-    def thrust_at(self, share: float) -> float:
-        """Return the thrust at rest at a lagged command. [N]"""
-        return float(thrust_at_rest(share, self.row()))
-
     def row(self) -> np.ndarray:
         """Return the row of the compiled table (COLUMNS,)."""
         curve = (self.thrust_ahead, self.thrust_astern, self.curve_exponent, self.dead_band)

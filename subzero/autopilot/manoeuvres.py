@@ -302,12 +302,12 @@ def _check_actuators(line: Manoeuvre, name: str, model: Model) -> None:
         if line.program is VerticalZigZag and "pitch" in (unheld(hull) or ()):
             raise UserError(f"{name} needs thrusters that pitch the vehicle, and its own do not.")
         return
-    lacking = [] if hull.propeller.thrust_constant > 0.0 else ["propeller"]
-    fins = {"rudder": hull.has_rudder, "stern-planes": hull.has_stern_planes}
-    moved = {ZigZag: "rudder", TurningCircle: "rudder", Spiral: "rudder", VerticalZigZag: "stern-planes"}
+    lacking = [] if hull.propeller.thrust_constant > 0.0 else ["a propeller"]
+    fins = {"a rudder": hull.has_rudder, "stern-planes": hull.has_stern_planes}
+    moved = dict.fromkeys((ZigZag, TurningCircle, Spiral), "a rudder") | {VerticalZigZag: "stern-planes"}
     lacking += [fin for fin, there in fins.items() if moved.get(line.program) == fin and not there]
     if lacking:
-        raise UserError(f"{name} needs a {' and a '.join(lacking)}, and this vehicle has none.")
+        raise UserError(f"{name} needs {' and '.join(lacking)}, and this vehicle has none.")
 
 
 def usual_speed(model: Model) -> float:
@@ -357,6 +357,6 @@ def _inner(run: xr.Dataset, helm: Helm) -> dict[str, np.ndarray]:
     together = 0.5 * (found["stern_plane_port_command"] + found["stern_plane_starboard_command"])
     found["planes"] = np.where(np.abs(together - together[0]) < 1e-9, 0.0, together - together[0])
     if isinstance(helm, ThrusterHelm):
-        commands = np.column_stack([run[f"{name}_command"].values for name, _ in helm.hull.thrusters])
+        commands = np.column_stack([run[f"{name}_command"].values for name in helm.names])
         found |= {"rudder_command": helm.angles("yaw", commands), "planes": helm.angles("pitch", commands)}
     return found

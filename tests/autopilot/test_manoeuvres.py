@@ -192,24 +192,47 @@ def test_what_cannot_be_done_is_told(call, words):
         call()
 
 
+WITHOUT_A_PROPELLER = ("open_frame", "seawing")
+LONG = ("nps_auv2",)
+"""Hulls of several metres, for which the manoeuvres are too short to have all indices."""
+
+
 @pytest.mark.parametrize("name", list(MANOEUVRES))
 @pytest.mark.parametrize("vehicle", [*shipped("vehicles"), "auv.toml"])
 def test_every_vehicle_flies_what_its_actuators_allow_and_says_why_not(tmp_path, name, vehicle):
-    """REMUS 100 needs 1.58 m/s to be held level; a torpedo from four numbers flies at 1 m/s as Subzero does. NPS AUV II is
-    5.3 m long: not all of a manoeuvre happens within the time of one of 1 m.
-    """
+    """REMUS 100 needs 1.58 m/s to be held level; a torpedo from four numbers flies at 1 m/s as Subzero does."""
     if vehicle == "auv.toml":
         known = "length_m = 2.0\ndiameter_m = 0.2\nmass_kg = 45\nspeed_m_s = 1.8"
         vehicle = tmp_path / "auv.toml"
         vehicle.write_text(f'base = "torpedo"\n[known]\n{known}\n')
     trial = subzero.load_scenario("fig6")
     trial = dataclasses.replace(with_vehicle(trial, vehicle)[0], start=Start(depth=20.0))
-    if vehicle in ("open_frame", "seawing"):
+    if vehicle in WITHOUT_A_PROPELLER:
         with pytest.raises(subzero.UserError, match=f"{name} needs a propeller.* and this vehicle has none"):
             autopilot.manoeuvre(name, trial)
         return
     run, measured = autopilot.manoeuvre(name, trial, tethered=False)
     assert run.attrs["outcome"] == "completed"
-    finite = [np.isfinite(value) for value in measured.values()]
-    assert vehicle == "nps_auv2" or all(finite)
+    assert vehicle in LONG or all(np.isfinite(value) for value in measured.values())
     assert "contradictory_numbers" not in run.attrs["warnings"]
+    if name == "zigzag":
+        assert {"forces"} < subzero.figures.draw(run).keys()
+
+
+def test_thrusters_turn_to_either_side_alike_and_those_that_do_not_pitch_say_so():
+    """The overshoots of a zigzag by moments: a rudder to starboard turns the heading to starboard."""
+    trial = with_vehicle(subzero.load_scenario("fig6"), "bluerov2_heavy")[0]
+    run, measured = autopilot.manoeuvre("turning_circle", trial, tethered=False, size=5.0)
+    other, mirrored = autopilot.manoeuvre("turning_circle", trial, tethered=False, size=-5.0)
+    assert measured["final_turn_rate_deg_s"] > 20.0
+    assert mirrored["final_turn_rate_deg_s"] == pytest.approx(-measured["final_turn_rate_deg_s"], rel=1e-6)
+    np.testing.assert_allclose(other["surge_speed"].values, run["surge_speed"].values, atol=1e-9)
+    hull = subzero.Model.of(trial).vehicle
+    level = tuple(row for row in hull.thrusters if not row[0].startswith("vertical"))
+    up = dataclasses.replace(dict(hull.thrusters)["vertical_front_port"], x=0.0, y=0.0)
+    model = dataclasses.replace(
+        subzero.Model.of(trial), vehicle=dataclasses.replace(hull, thrusters=(*level, ("up", up)))
+    )
+    with pytest.raises(subzero.UserError, match="needs thrusters that pitch the vehicle, and its own do not"):
+        autopilot.manoeuvre("vertical_zigzag", trial, model=model)
+    assert autopilot.manoeuvre("zigzag", trial, model=model, tethered=False)[1]["period_s"] > 0.0
