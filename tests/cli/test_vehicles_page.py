@@ -82,3 +82,24 @@ def test_a_slip_in_a_table_is_said_with_its_line(tmp_path, capsys, change, said)
     message = capsys.readouterr().err
     assert said in message
     assert message.count("\n") <= 11
+
+
+def test_fins_masses_engines_and_commands_of_the_page_are_a_vehicle_and_a_trial(tmp_path):
+    text = 'base = "open_frame"\n' + block("[fins") + block("[moving_masses")
+    (tmp_path / "glider.toml").write_text(text)
+    names = {number.name for number in contents(str(tmp_path / "glider.toml")).numbers}
+    assert {
+        "vehicle.fins.foreplane_port.span_angle",
+        "vehicle.moving_masses.battery.turn_limit",
+        "vehicle.buoyancy_engines.bladder.pump_rate",
+    } <= names
+    trial = subzero.load_scenario("glider_sawtooth").text
+    assert block("[commands]").splitlines()[2] in trial.replace(
+        "   # displaced beyond rest: negative is heavy", ""
+    )
+    (tmp_path / "trial.toml").write_text(trial[: trial.index("\n[commands]")] + "\n" + block("[commands]"))
+    assert subzero.load_scenario(tmp_path / "trial.toml").commands.listed == (
+        "battery_slide",
+        "battery_turn",
+        "bladder",
+    )
