@@ -1,9 +1,9 @@
 """A buoyant body on a tether whose lower end is led away, then stopped: ours and MoorDyn, both coupled.
 
 `python -m benchmarks.coupled_body` prints the largest differences of its path and of the tension at it. The body is a
-free point in MoorDyn, with mass, volume, drag and added mass alike in all directions; ours is an open frame with the same
-by its table of derivatives (X_Uu = Y_Uv = Z_Uw), a hull that is coupled to its cable in the usual way. By the principle
-of relativity, led away in still water is moored in a current. Neither line has added mass, as in `peers.moordyn_wire`.
+free point in MoorDyn, with mass, volume, drag and added mass alike in all directions; ours is an open frame with the
+same by its table of derivatives (X_Uu = Y_Uv = Z_Uw), a hull that is coupled to its cable in the usual way. By the
+principle of relativity, led away in still water is moored in a current. Neither line has added mass, as in `peers.moordyn_wire`.
 
 `pip install 'subzero-auv[peers]'` brings MoorDyn.
 """
@@ -81,7 +81,8 @@ def vehicle_text(body: Body) -> str:
     return "\n".join(
         [
             'base = "open_frame"', "[rigid_body]", f'mass = {{ value = {body.mass}, unit = "kg" }}', "[buoyancy]",
-            f'net_buoyancy = {{ value = {body.buoyancy}, unit = "N" }}', "[tow_point]", place, "[derivatives]", *rows, "",
+            f'net_buoyancy = {{ value = {body.buoyancy}, unit = "N" }}', "[tow_point]", place, "[derivatives]",
+            *rows, "",
         ]
     )  # fmt: skip
 
@@ -159,7 +160,7 @@ def moordyn_run(body: Body, count: int = 80) -> Run:
         point, line = moordyn.GetPoint(system, 2), moordyn.GetLine(system, 1)
         for k in range(round(DURATION_S / EXCHANGE)):
             here, there = (led(n * EXCHANGE)[0] for n in (k, k + 1))
-            place, velocity = first + [here, 0.0, 0.0], [(there - here) / EXCHANGE, 0.0, 0.0]
+            place, velocity = first + np.array([here, 0.0, 0.0]), [(there - here) / EXCHANGE, 0.0, 0.0]
             moordyn.Step(system, list(place), velocity, k * EXCHANGE, EXCHANGE)
             rows.append([*(UPWARD * moordyn.GetPointPos(point)), moordyn.GetLineFairTen(line)])
         moordyn.Close(system)

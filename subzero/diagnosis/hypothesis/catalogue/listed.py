@@ -1,5 +1,5 @@
-"""Effects of a vehicle's own: of its listed actuators (thrusters, fins, moving masses, buoyancy engines), of the damping
-of a hull that thrusters drive, and of its tether.
+"""Effects of a vehicle's own: of its listed actuators (thrusters, fins, moving masses, buoyancy engines), of the
+damping of a hull that thrusters drive, and of its tether.
 
 A vehicle without a list has none of these, and its catalogue is as it was. Station keeping knows nothing of a lost
 command: it is the actuator that does less than it is told.
