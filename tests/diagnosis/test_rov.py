@@ -24,7 +24,8 @@ from subzero.records.record import Record, read_record
 
 DURATION, RATE = 25.0, 5.0
 CHANNELS = (
-    "heading", "yaw_rate", "pitch", "roll_angle", "depth", "surge_speed", "sway_speed", "north", "east", "cable_tension",
+    "heading", "yaw_rate", "pitch", "roll_angle", "depth", "surge_speed", "sway_speed", "north", "east",
+    "cable_tension",
 )  # fmt: skip
 HOVER = subzero.load_scenario("rov_hover")
 
@@ -52,7 +53,7 @@ def test_a_thruster_that_does_less_is_named_with_its_size(trial_file, name, seed
     weak = HOVER.with_changes({f"vehicle.thrusters.{name}.lost_command": 0.4})
     verdict = diagnose(record_of(weak, seed), trial_file, budget="verdict")
     (cause,) = verdict.causes
-    assert (verdict.verdict, cause.id) == ("cause_named", f"lost_command:{name}")
+    assert (verdict.verdict, cause.id) == ("cause_named", f"thruster:{name}")
     lost = cause.parameters["lost_share"]
     assert lost.deviation_sd < 0.05
     assert lost.value == pytest.approx(0.4, abs=3.0 * lost.deviation_sd)
@@ -82,21 +83,24 @@ def test_a_tether_that_is_held_by_something_is_told_as_its_pull(trial_file):
 def test_a_vehicle_without_lists_has_the_causes_that_it_had():
     assert listed.effects_of(subzero.Model.of(subzero.load_scenario("fig6")).vehicle) == ()
     rov = [effect.id for effect in listed.effects_of(subzero.Model.of(HOVER).vehicle)]
-    assert rov[:1] == ["lost_command:front_starboard"]
+    assert rov[:1] == ["thruster:front_starboard"]
     assert rov[-5:] == ["damping:surge", "damping:sway", "damping:heave", "damping:yaw", "tether_pull"]
     assert not set(rov) & set(catalogue(CHANNELS))
+    for effect in listed.effects_of(subzero.Model.of(HOVER).vehicle):
+        assert listed.description_of(effect.id) == {"sentence": effect.sentence, "slot": effect.slot}
+    assert listed.description_of("sensor_bias:heading") == {}
 
 
-@pytest.mark.parametrize("name", [f"lost_command:{name}" for name, _ in subzero.Model.of(HOVER).vehicle.thrusters])
+@pytest.mark.parametrize(
+    "name", [f"thruster:{name}" for name, _ in subzero.Model.of(HOVER).vehicle.thrusters]
+)
 def test_a_lost_command_is_that_of_the_vehicle_and_station_keeping_knows_nothing_of_it(name):
     setting = Setting(trial=HOVER, model=subzero.Model.of(HOVER))
     effects = {effect.id: effect for effect in listed.effects_of(setting.model.vehicle)}
     thruster = name.partition(":")[2]
     changed = effects[name].apply(setting, 0.4).model.vehicle
     assert changed == setting.model.vehicle.with_parameter(f"thrusters.{thruster}.lost_command", 0.4)
-    np.testing.assert_array_equal(
-        changed.own_numbers.thrusters, setting.model.vehicle.own_numbers.thrusters
-    )
+    np.testing.assert_array_equal(changed.own_numbers.thrusters, setting.model.vehicle.own_numbers.thrusters)
 
 
 def test_a_log_may_hold_the_commands_of_thrusters_and_they_can_be_flown(tmp_path, trial_file):
