@@ -35,7 +35,7 @@ MANOEUVRE_COMMANDS = {
     "vertical_zigzag": ("pitch", "stern_plane_port_command"),
     "crash_stop": ("heading", "propeller_command"),
 }
-THRUSTER_CHANNELS = {"vertical_zigzag": ("pitch", "pitch_rate"), "crash_stop": ("heading", "surge_speed")}
+THRUSTER_CHANNELS = {"vertical_zigzag": ("pitch", "pitch_rate"), "crash_stop": ("heading", "yaw_rate")}
 """The same of a vehicle on thrusters, whose commands are those of many."""
 STEP_COMMANDS = {
     "heading_step": ("heading", "rudder_command"),

@@ -107,6 +107,8 @@ HEADLINES = {
     "depth": "Depth",
     "pitch": "Pitch, positive nose up",
     "surge_speed": "Forward speed",
+    "yaw_rate": "Yaw rate, positive to starboard",
+    "pitch_rate": "Pitch rate, positive nose going up",
     "rudder_command": "Rudder command, positive to starboard",
     "stern_plane_port_command": "Port plane command, positive nose up",
     "propeller_command": "Propeller command",

@@ -17,7 +17,7 @@ import numpy as np
 
 from subzero import identification as general
 from subzero.channels import BY_NAME, HEADING
-from subzero.diagnosis.hypothesis.catalogue import SPECS, START, catalogue
+from subzero.diagnosis.hypothesis.catalogue import SPECS, START, catalogue, with_own
 from subzero.diagnosis.hypothesis.catalogue.sensors import SCALE
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter, with_onset
@@ -84,9 +84,10 @@ def _effects(setting: Setting, channels: Sequence[str]) -> dict[str, Effect]:
     """Return the effects that are possible in a trial and change something in it."""
     slots = () if setting.tethered else ("cable", "drum")
     drum = ("drum",) if setting.model.winch is not None else ()
+    own = with_own((), setting.model.vehicle)
     return {
         effect.id: replace(effect, parameters=tuple(p.within(setting) for p in effect.parameters))
-        for effect in (with_tolerances(each, setting) for each in catalogue(channels).values())
+        for effect in (with_tolerances(each, setting) for each in catalogue(channels, own).values())
         if effect.slot not in (*slots, *drum)
         and effect.id.partition(":")[0] not in OF_ANY_MODEL
         and not moves_nothing(effect, setting)

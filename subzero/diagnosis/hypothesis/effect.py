@@ -69,7 +69,7 @@ class Effect:
     Attributes:
         id: such as "rudder_lag" or "sensor_bias:heading".
         sentence: its description in words: "the rudder servo lags".
-        slot: where it acts: hull, propulsion, fins, cable, drum, water, start, sensors, clock.
+        slot: where it acts: hull, propulsion, thrusters, fins, cable, drum, water, start, sensors, clock.
         parameters: one or two.
         apply: changes a setting.
         sudden: it can begin in the middle of a trial ("<id>@t").

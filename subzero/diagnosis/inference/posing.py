@@ -122,7 +122,7 @@ def _possible(effect: Effect, observed: Sequence[Observed]) -> bool:
 def _is_absent(effect: Effect, nominal: Setting) -> bool:
     """Say whether a cause of propeller, rudder or stern-planes has nothing to act on in a vehicle without them."""
     hull = nominal.model.vehicle
-    if ":" in effect.id:  # of a listed actuator, by its name
+    if ":" in effect.id:  # of a sensor or a listed actuator, by its name
         return False
     absent = {"propulsion": not hull.propeller.thrust_constant > 0.0, "fins": False}
     absent["fins"] = not (hull.fins or hull.rudder.area > 0.0 or hull.stern_planes.area > 0.0)

@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from subzero.channels import BY_NAME
-from subzero.diagnosis.hypothesis.effect import plain_id
 from subzero.diagnosis.report import words
 from subzero.diagnosis.report.tables import CLEAR_FROM, CONFUSED_BELOW, SEEN_SIGNAL
 from subzero.diagnosis.results import (
@@ -48,6 +47,7 @@ MOST_HIDDEN = 5
 
 LOOK_AT = {
     "propulsion": "the propeller, its motor and the battery",
+    "thrusters": "the thruster: its propeller, its motor and its electronics",
     "fins": "the fins, their servos and linkages",
     "cable": "the cable",
     "drum": "the drum and its bearings",
@@ -334,8 +334,7 @@ def _next(verdict: Verdict) -> Iterator[str]:
 
 
 def _place(cause: str) -> str:
-    effect = words.effects().get(plain_id(cause))
-    return LOOK_AT.get(effect.slot, "") if effect is not None else ""
+    return LOOK_AT.get(words.description_of(cause).get("slot", ""), "")
 
 
 def _settles(verdict: Verdict) -> Iterator[str]:

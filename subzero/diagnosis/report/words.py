@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from subzero.channels import BY_NAME
-from subzero.diagnosis.hypothesis.catalogue import all_effects
+from subzero.diagnosis.hypothesis.catalogue import all_effects, listed
 from subzero.diagnosis.hypothesis.effect import plain_id
 from subzero.diagnosis.results import (
     CALIBRATED,
@@ -154,13 +154,20 @@ def _explained(name: str, known: Mapping[str, str]) -> str:
     if name.startswith(DRIFT):
         return f"the sensor of the {_spaced(name.removeprefix(DRIFT))} drifts"
     what, _, since = name.partition("@")
-    effect = effects().get(plain_id(name))
-    sentence = known.get(what) or (effect.sentence if effect is not None else _spaced(what))
+    sentence = known.get(what) or description_of(name).get("sentence", _spaced(what))
     return f"from {since} s on {sentence}" if since else sentence
 
 
 effects = cache(all_effects)
 """Every effect of the catalogue, by id."""
+
+
+def description_of(name: str) -> dict[str, str]:
+    """Return sentence and slot of a cause by its id, with or without an onset; empty for one that is not known."""
+    effect = effects().get(plain_id(name))
+    if effect is None:
+        return listed.description_of(plain_id(name))
+    return {"sentence": effect.sentence, "slot": effect.slot}
 
 
 def _spaced(name: str) -> str:

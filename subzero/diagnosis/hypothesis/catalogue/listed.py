@@ -21,10 +21,10 @@ from vehicle.lists import LISTS
 KINDS = {
     "thrusters": "thruster",
     "fins": "fin",
-    "moving_masses": "moving mass",
-    "buoyancy_engines": "buoyancy engine",
+    "moving_masses": "moving_mass",
+    "buoyancy_engines": "buoyancy_engine",
 }
-"""List of a vehicle → one of it, in words."""
+"""List of a vehicle → one of it; causes are called ``thruster:front_port``."""
 DAMPED = {"surge": "X_uu", "sway": "Y_vv", "heave": "Z_ww", "yaw": "N_rr"}
 """Axis → the derivative of its drag, quadratic in the speed."""
 
@@ -41,6 +41,22 @@ def effects_of(vehicle: Vehicle) -> tuple[Effect, ...]:
     return (*lost, *damped, TETHER_PULL)
 
 
+def _description(kind: str, name: str) -> dict[str, str]:
+    """Return sentence and slot of a cause that is called ``kind:name``."""
+    if kind == "damping":
+        return {"sentence": f"the hull drags more or less in {name}", "slot": "hull"}
+    sentence = f"the {kind.replace('_', ' ')} {name} does less than it is commanded"
+    return {"sentence": sentence, "slot": "thrusters" if kind == "thruster" else "fins"}
+
+
+def description_of(effect_id: str) -> dict[str, str]:
+    """Return sentence and slot of a cause by its id alone, where the vehicle is not at hand; empty for another id."""
+    if effect_id == TETHER_PULL.id:
+        return {"sentence": TETHER_PULL.sentence, "slot": TETHER_PULL.slot}
+    kind, colon, name = effect_id.partition(":")
+    return _description(kind, name) if colon and kind in (*KINDS.values(), "damping") else {}
+
+
 def _lost_command(section: str, name: str, part: Any) -> Effect:
     """Return the effect of an actuator that follows a part of its command alone: 1 is dead, or jammed."""
     lost = float(part.lost_command)
@@ -55,9 +71,8 @@ def _lost_command(section: str, name: str, part: Any) -> Effect:
         nominal=lambda setting: float(dict(getattr(setting.model.vehicle, section))[name].lost_command),
     )
     return Effect(
-        id=f"lost_command:{name}",
-        sentence=f"the {kind} {name} does less than it is commanded",
-        slot="propulsion" if section == "thrusters" else "fins",
+        id=f"{kind}:{name}",
+        **_description(kind, name),
         parameters=(share,),
         apply=partial(_with_lost_command, section, name),
         sudden=True,
@@ -75,8 +90,7 @@ def _damping(axis: str, key: str) -> Effect:
     share = Parameter(name="share", unit="1", tolerance=0.05, scale=0.4, low=-0.9, high=5.0)
     return Effect(
         id=f"damping:{axis}",
-        sentence=f"the hull drags more or less in {axis}",
-        slot="hull",
+        **_description("damping", axis),
         parameters=(share,),
         apply=partial(_with_damping, key),
         sudden=True,
