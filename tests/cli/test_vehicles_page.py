@@ -94,8 +94,6 @@ def test_fins_masses_engines_and_commands_of_the_page_are_a_vehicle_and_a_trial(
         "vehicle.buoyancy_engines.bladder.pump_rate",
     } <= names
     trial = subzero.load_scenario("glider_sawtooth").text
-        "   # displaced beyond rest: negative is heavy", ""
-    )
     (tmp_path / "trial.toml").write_text(trial[: trial.index("\n[commands]")] + "\n" + block("[commands]"))
     assert subzero.load_scenario(tmp_path / "trial.toml").commands.listed == (
         "battery_slide",
