@@ -24,13 +24,11 @@ HARD_OVER, SHARE_OF_HARD_OVER = radians(35.0), 0.5
 
 
 class Helm(Protocol):
-    """The command of a vehicle for a rudder and stern-planes.
+    """The command of a vehicle for a rudder and stern-planes."""
 
-    Attributes:
-        straight: command of the straight run.
-    """
-
-    straight: tuple[float, ...]
+    @property
+    def straight(self) -> tuple[float, ...]:
+        """Command of the straight run."""
 
     def command(
         self, *, rudder: float | None = None, planes: float = 0.0, propulsion: float = 1.0
