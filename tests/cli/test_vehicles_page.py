@@ -82,3 +82,23 @@ def test_a_slip_in_a_table_is_said_with_its_line(tmp_path, capsys, change, said)
     message = capsys.readouterr().err
     assert said in message
     assert message.count("\n") <= 11
+
+
+def test_commands_by_name_of_the_page_are_a_trial(tmp_path):
+    text = subzero.load_scenario("rov_hover").text
+    (tmp_path / "trial.toml").write_text(text[: text.index("\n[station]")] + "\n" + block("[commands]"))
+    trial = subzero.load_scenario(tmp_path / "trial.toml")
+    assert trial.commands.listed == ("front_starboard", "front_port", "aft_starboard", "aft_port")
+    assert trial.commands.at(6.0)[4:].tolist() == [0.0] * 4
+    assert trial.commands.at(30.0)[4:].tolist() == [-0.2, -0.2, 0.2, 0.2]
+
+
+def test_the_python_of_the_page_runs():
+    first, second = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    names: dict = {}
+    exec(first, names)
+    assert names["rov"].observation.surge_speed > 0.0
+    exec(second, names)
+    assert names["steady"].state[7] == 0.1
+    assert "front_port_command" in names["linear"].input_labels
+    assert names["hover"].wet_length == 60.0
