@@ -2,8 +2,9 @@
 
 `python -m benchmarks.coupled_body` prints the largest differences of its path and of the tension at it. The body is a
 free point in MoorDyn, with mass, volume, drag and added mass alike in all directions; ours is an open frame with the
-same by its table of derivatives (X_Uu = Y_Uv = Z_Uw), a hull that is coupled to its cable in the usual way. By the
-principle of relativity, led away in still water is moored in a current. Neither line has added mass, as in `peers.moordyn_wire`.
+same by its table of derivatives (X_Uu = Y_Uv = Z_Uw), a hull that is coupled to its cable in the usual way. Led away in
+still water is moored in a current, by the principle of relativity. Neither line has added mass, as in
+`peers.moordyn_wire`.
 
 `pip install 'subzero-auv[peers]'` brings MoorDyn.
 """
@@ -81,8 +82,8 @@ def vehicle_text(body: Body) -> str:
     return "\n".join(
         [
             'base = "open_frame"', "[rigid_body]", f'mass = {{ value = {body.mass}, unit = "kg" }}', "[buoyancy]",
-            f'net_buoyancy = {{ value = {body.buoyancy}, unit = "N" }}', "[tow_point]", place, "[derivatives]",
-            *rows, "",
+            f'net_buoyancy = {{ value = {body.buoyancy}, unit = "N" }}', "[tow_point]", place,
+            "[derivatives]", *rows, "",
         ]
     )  # fmt: skip
 

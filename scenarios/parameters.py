@@ -44,6 +44,7 @@ from scenarios.quantities import (
     PROFILE,
     RUN,
     START,
+    STATION,
     VESSEL,
     WATER,
     WINCH,
@@ -275,6 +276,8 @@ def _known(trial: Trial) -> dict[str, tuple[Row, np.ndarray]]:
             known[f"{section}.{quantity.name}"] = quantity, np.array([getattr(owner, field) / quantity.scale])
     for quantity, value in zip((*WATER, *BED), (*trial.current, trial.sea_bed), strict=True):
         known[f"water.{quantity.name}"] = quantity, np.array([value])
+    if trial.station is not None:
+        known[f"station.{STATION[0].name}"] = STATION[0], np.array([trial.station.bandwidth])
     for section in _LISTS:
         for quantity, column in _columns(trial, section):
             known[f"{section}.{quantity.name}"] = quantity, column / quantity.scale
@@ -289,7 +292,9 @@ def _row(trial: Trial, name: str) -> tuple[Row, int] | None:
     if section in PARTS:
         row = _pattern_rows().get(name) or _part_rows(trial).get(name)
         return None if row is None else (row, 1)
-    if section in ("run", "start", "water") and (single := _SINGLE[section].get(key)):
+    if section == "station" and trial.station is None:
+        return None
+    if section in _SINGLE and (single := _SINGLE[section].get(key)):
         return single, 1
     for quantity, column in _columns(trial, section) if section in _LISTS else ():
         if quantity.name == key:
@@ -401,6 +406,13 @@ def _with_water(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
     return changed | (_with_lists("water")(trial, lists) if lists else {})
 
 
+def _with_station(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
+    lists = {name: value for name, value in own.items() if name != STATION[0].name}
+    changed = _with_lists("station")(trial, lists)
+    bandwidth = {"bandwidth": own[STATION[0].name]} if STATION[0].name in own else {}
+    return {"station": replace(changed["station"], **bandwidth)}
+
+
 def _columns(trial: Trial, section: str) -> list[tuple[Quantity, np.ndarray]]:
     """Return the lists of a section, in inner units; none where the trial has no such section."""
     part = getattr(trial, _LISTS[section])
@@ -412,6 +424,9 @@ def _columns(trial: Trial, section: str) -> list[tuple[Quantity, np.ndarray]]:
     if section == "winch":
         row = SETPOINT[part.control]
         return [] if row is None else [(WINCH[0], np.array(part.time)), (row, np.array(part.setpoint))]
+    if section == "station":
+        columns = (part.time, *zip(*part.place, strict=True), part.heading)
+        return [(row, np.array(column)) for row, column in zip(STATION[1:], columns, strict=True)]
     rows = {"commands": COMMANDS, "vessel": VESSEL, "water": PROFILE}[section]
     if section == "commands":
         listed = {actuator_of(column): column for column in listed_columns(trial.vehicle)}
@@ -444,6 +459,8 @@ def _part_fields(section: str, part: Any, columns: list[np.ndarray]) -> dict[str
         return dict(zip(names, columns, strict=True))
     if section == "winch":
         return {"time": first, "setpoint": others[0]}
+    if section == "station":
+        return {"time": first, "place": np.column_stack(others[:3]), "heading": others[3]}
     table = np.column_stack(others)
     along = {"water": "depth"}.get(section, "time")
     return {along: first, "values" if section == "commands" else "velocity": table}
@@ -453,6 +470,7 @@ _SINGLE: dict[str, dict[str, Quantity]] = {
     "run": {row.name: row for row in RUN},
     "start": {row.name: row for row in START},
     "water": {row.name: row for row in (*WATER, *BED)},
+    "station": {STATION[0].name: STATION[0]},
 }
 """Section → its single numbers."""
 
@@ -461,6 +479,7 @@ _LISTS = {
     "winch": "winch",
     "vessel": "vessel",
     "motion": "motion",
+    "station": "station",
     "water": "profile",
 }
 """Section → the field of a trial that holds its lists."""
@@ -468,6 +487,7 @@ _LISTS = {
 _CHANGES: dict[str, Callable[[Trial, Mapping[str, float]], dict[str, Any]]] = {
     **{section: _with_part(section) for section in PARTS},
     **{section: _with_lists(section) for section in _LISTS if section != "water"},
+    "station": _with_station,
     "run": _with_run,
     "start": _with_start,
     "water": _with_water,

@@ -140,7 +140,7 @@ def _letter_factors(found: re.Match[str]) -> list[str]:
 
 
 def complaint(name: str, named: Sequence[str]) -> tuple[str, str] | None:
-    """Return why a name is no derivative, and the names that are allowed, the nearest first; None if it is one."""
+    """Return why a name is no derivative, and the allowed names, the nearest first; None if it is one."""
     if parsed(name, named):
         return None
     bare = name.removesuffix("'")

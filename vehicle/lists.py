@@ -145,7 +145,7 @@ def list_problems(vehicle: Vehicle) -> list[Problem]:
 
 
 def further_problems(vehicle: Vehicle) -> list[Problem]:
-    """Return the problems of sections of the hull, products of inertia, and of derivatives with fins and race."""
+    """Return the problems of sections, products of inertia, and of the fins and the race that derivatives name."""
     return [
         *section_problems(vehicle.sections),
         *inertia_problems(vehicle.rigid_body, vehicle.products_of_inertia),

@@ -28,7 +28,6 @@ from subzero.derivative_names import FIN_NAMES, RACE, DerivativeName
 from subzero.errors import short
 from subzero.jit import Record, compiled, gated_inlined, scratch
 from vehicle.derivatives import Derivatives, factor_names
-from vehicle.fin_list import MOST_FINS, listed_angle
 from vehicle.parameters import Problem, Section, parameter
 
 if TYPE_CHECKING:
@@ -40,11 +39,13 @@ MOST_FACTORS = 8
 """Factors of a product, with those that a prime brings. [-]"""
 LETTERS = ("1", "u", "v", "w", "p", "q", "r", "U", "n")
 FIRST_FIN = len(LETTERS) + len(FIN_NAMES) + 1
-FACTORS = FIRST_FIN + MOST_FINS
-"""Factors there are: letters, fins, the race, listed fins; behind their values stand their absolute values."""
+FACTORS = 32
+"""So many values of factors there may be: letters, fins, the race, listed fins; behind them, their absolute values."""
 VALUES = 2 * FACTORS
 SLOWEST = 1e-6
-"""The race is that at this speed below it: its products have u as a factor, and remain finite. [m/s]"""
+"""Below this speed the race is that at it: products of it, which have u as a factor, are finite at rest. [m/s]"""
+TERMS = {"quadratic_damping": 8, "propeller": 10} | {name: 11 + i for i, name in enumerate(FIN_NAMES)}
+"""Places of the terms that products are booked with, in `vehicle.terms`."""
 
 
 class RaceNumbers(Record):
@@ -102,15 +103,12 @@ def race_excess(n: float, u: float, race: RaceNumbers) -> float:
     return math.copysign(jet, eta) - 1.0
 
 
-def table_of(
-    rows: list[tuple[DerivativeName, float]], named: Sequence[str], terms: dict[str, int]
-) -> np.ndarray:
+def table_of(rows: list[tuple[DerivativeName, float]], named: Sequence[str]) -> np.ndarray:
     """Return the compiled table (MOST_PRODUCTS, 3 + MOST_FACTORS): coefficient, term, force, places of the factors.
 
     Args:
         rows: names and values in SI units; those of matrices are left out.
         named: names of factors, of `derivatives.factor_names`.
-        terms: places of the terms "propeller", "quadratic_damping" and those of the fins.
     """
     places = {name: i for i, name in enumerate((*LETTERS, *named))}  # of fins in the order of their list
     places |= {f"|{name}|": FACTORS + i for name, i in places.items()}
@@ -118,7 +116,7 @@ def table_of(
     products = [(name, value) for name, value in rows if name.kind == "product"]
     for row, (name, value) in zip(table, products, strict=False):
         factors = [*name.factors, *["U"] * (name.is_primed * (2 - len(name.velocities)))]
-        row[:3] = value, terms[term_of(name)], name.force
+        row[:3] = value, TERMS[term_of(name)], name.force
         row[3 : 3 + len(factors)] = [places[factor] for factor in factors]
     return table
 
@@ -141,20 +139,20 @@ def term_of(name: DerivativeName) -> str:
 
 @compiled
 def add_products(
-    state: np.ndarray,
     nu_r: np.ndarray,
     n: float,
     angles: tuple[float, float, float],
+    own: np.ndarray,
     numbers: VehicleNumbers,
     terms: np.ndarray,
 ) -> None:
     """Add all products to terms (terms, 6) [N, N m].
 
     Args:
-        state: of the vehicle, for the angles of listed fins.
         nu_r: velocity relative to the water (u, v, w, p, q, r). [m/s, rad/s]
         n: shaft speed. [rev/s]
         angles: rudder, port plane, starboard plane in the water. [rad]
+        own: angles of the listed fins. [rad]
         numbers: VehicleNumbers.
         terms: added to.
     """
@@ -166,9 +164,9 @@ def add_products(
     values[8] = n
     values[9], values[10], values[11] = angles[0], angles[1], angles[2]
     values[12] = race_excess(n, nu_r[0], numbers.race)
-    for i in range(MOST_FINS):
-        values[FIRST_FIN + i] = listed_angle(state, angles, numbers.fins[i]) if i < numbers.fin_count else 0.0
-    for i in range(FACTORS):
+    for i in range(numbers.fin_count):
+        values[FIRST_FIN + i] = own[i]
+    for i in range(FIRST_FIN + numbers.fin_count):
         values[FACTORS + i] = abs(values[i])
     for i in range(numbers.product_count):
         product = table[i, 0]

@@ -90,7 +90,7 @@ def inertia_problems(body: RigidBody, products: ProductsOfInertia | None) -> lis
     if np.linalg.eigvalsh(inertias + products.matrix()[3:, 3:])[0] > 0.0:
         return []
     why = "about some axis the inertia would be negative"
-    allowed = "products that are small against the inertias of the rigid body"
+    allowed = "products that are small compared with the inertias of the rigid body"
     return [Problem(key="products_of_inertia", found=short(products.values()), why=why, allowed=allowed)]
 
 

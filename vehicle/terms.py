@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from subzero.jit import inlined
+from subzero.jit import inlined, scratch
 from vehicle.added_mass import munk_correction
 from vehicle.axial_drag import axial_drag
 from vehicle.body_lift import body_lift
@@ -27,7 +27,7 @@ from vehicle.buoyancy_engine import add_engines
 from vehicle.cross_flow import cross_flow_drag
 from vehicle.damping import linear_damping, quadratic_damping
 from vehicle.derivatives import add_damping
-from vehicle.fin_list import add_fins
+from vehicle.fin_list import MOST_FINS, add_fins, listed_angles
 from vehicle.fins import rudder, stern_plane
 from vehicle.flow_axes import add_flow_axes
 from vehicle.moving_mass import add_moving_masses
@@ -138,7 +138,9 @@ def fill_terms(
     stern_plane(nu_r, angles[1], -1.0, numbers.stern_planes, out[12])
     stern_plane(nu_r, angles[2], 1.0, numbers.stern_planes, out[13])
     if numbers.product_count > 0:
-        add_products(state, nu_r, n, angles, numbers, out)
+        own = scratch(1, MOST_FINS)[0]
+        listed_angles(state, angles, numbers.fins, numbers.fin_count, own)
+        add_products(nu_r, n, angles, own, numbers, out)
     for i in range(6):
         out[14, i] = wrench_b[i]
     if numbers.mass_count > 0:

@@ -52,7 +52,6 @@ from vehicle.propeller import Propeller, PropellerNumbers
 from vehicle.restoring import Buoyancy, RestoringNumbers
 from vehicle.rigid_body import ProductsOfInertia, RigidBody
 from vehicle.state import STATE_SIZE
-from vehicle.terms import BREAKDOWN
 from vehicle.thrusters import Thruster, table_of
 
 
@@ -244,7 +243,7 @@ class Vehicle:
             tabled=bool(self.derivatives),
             linear_table=self.derivatives.linear(density, length),
             quadratic_table=self.derivatives.quadratic(density, length),
-            products=product_table_of(rows, self.derivatives.named, _PLACES),
+            products=product_table_of(rows, self.derivatives.named),
             product_count=count_of(rows),
             race=self.race.numbers() if self.race else NO_RACE,
             has_sections=bool(self.sections),
@@ -265,9 +264,6 @@ class Vehicle:
             table = table.setdefault(section, {})
         table[name] = value
         return from_mapping(mapping)
-
-
-_PLACES = {name: i for i, name in enumerate(BREAKDOWN)}
 
 
 @lru_cache(maxsize=4)

@@ -138,7 +138,7 @@ def _logged(
 
 
 def _with_some_commands(trial: scenarios.Trial) -> scenarios.Trial:
-    """Return a trial that keeps a station with commands of zero beside it: its thrusters are commanded by the station,
+    """Return a trial that keeps a station with commands of zero added: its thrusters are commanded by the station,
     in the simulation of each hypothesis anew, and nothing else is.
     """
     if trial.commands is not None or trial.station is None:

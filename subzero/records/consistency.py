@@ -274,8 +274,8 @@ def _with_recorded_commands(record: Record, names: list[str], trial: scenarios.T
 
 
 def _with_listed_commands(record: Record, trial: scenarios.Trial) -> scenarios.Trial:
-    """Return the trial with the record's commands of listed actuators, in place of a station; what is not recorded
-    remains that of the scenario, or zero.
+    """Return the trial with the record's commands of listed actuators, in place of a station; a column that is not
+    recorded remains that of the scenario, or zero.
     """
     zero = scenarios.Commands(time=np.zeros(1), values=np.zeros((1, len(REPORTED_COMMANDS))))
     others = trial.commands or zero
@@ -289,9 +289,7 @@ def _with_listed_commands(record: Record, trial: scenarios.Trial) -> scenarios.T
     try:
         return dataclasses.replace(trial, commands=commands, motion=None, station=None)
     except scenarios.ScenarioError as error:
-        raise UserError(
-            f"{record.source}: its commands are not those of the vehicle of {trial.name}. {error}"
-        ) from None
+        raise UserError(f"{record.source}: its commands are not those of {trial.name}. {error}") from None
 
 
 def _new_commands(

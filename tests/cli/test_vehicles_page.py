@@ -84,13 +84,22 @@ def test_a_slip_in_a_table_is_said_with_its_line(tmp_path, capsys, change, said)
     assert message.count("\n") <= 11
 
 
-def test_commands_by_name_of_the_page_are_a_trial(tmp_path):
-    text = subzero.load_scenario("rov_hover").text
-    (tmp_path / "trial.toml").write_text(text[: text.index("\n[station]")] + "\n" + block("[commands]"))
-    trial = subzero.load_scenario(tmp_path / "trial.toml")
-    assert trial.commands.listed == ("front_starboard", "front_port", "aft_starboard", "aft_port")
-    assert trial.commands.at(6.0)[4:].tolist() == [0.0] * 4
-    assert trial.commands.at(30.0)[4:].tolist() == [-0.2, -0.2, 0.2, 0.2]
+def test_fins_masses_engines_and_commands_of_the_page_are_a_vehicle_and_a_trial(tmp_path):
+    text = 'base = "open_frame"\n' + block("[fins") + block("[moving_masses")
+    (tmp_path / "glider.toml").write_text(text)
+    names = {number.name for number in contents(str(tmp_path / "glider.toml")).numbers}
+    assert {
+        "vehicle.fins.foreplane_port.span_angle",
+        "vehicle.moving_masses.battery.turn_limit",
+        "vehicle.buoyancy_engines.bladder.pump_rate",
+    } <= names
+    trial = subzero.load_scenario("glider_sawtooth").text
+    (tmp_path / "trial.toml").write_text(trial[: trial.index("\n[commands]")] + "\n" + block("[commands]"))
+    assert subzero.load_scenario(tmp_path / "trial.toml").commands.listed == (
+        "battery_slide",
+        "battery_turn",
+        "bladder",
+    )
 
 
 def test_the_python_of_the_page_runs():

@@ -15,9 +15,17 @@ import pytest
 from scenarios.files import read_toml, shipped_path
 from scenarios.parts import nested, part_of
 from subzero.derivative_names import complaint, parsed
-from vehicle import VehicleError, breakdown_table, derivative, from_mapping, initial_state, to_mapping
+from vehicle import (
+    BREAKDOWN,
+    VehicleError,
+    breakdown_table,
+    derivative,
+    from_mapping,
+    initial_state,
+    to_mapping,
+)
 from vehicle.derivatives import factor_names
-from vehicle.products import race_excess
+from vehicle.products import TERMS, race_excess
 
 FRAME = nested(part_of(read_toml(shipped_path("vehicles", "open_frame"), "open_frame"), "vehicle")[0].values)
 NU = (1.5, -0.3, 0.2, 0.4, -0.5, 0.6)
@@ -385,3 +393,7 @@ def test_a_file_that_cannot_be_is_refused_with_the_line_and_the_nearest_name(cha
         for each in problems
     )
     assert all("line " in str(each) for each in problems)
+
+
+def test_products_are_booked_with_the_terms_of_these_names():
+    assert {name: BREAKDOWN.index(name) for name in TERMS} == TERMS

@@ -132,3 +132,20 @@ def test_declared_ranges_are_those_of_the_files(fig6, umbilical):
     assert declared_ranges(umbilical)["cable.diameter"] == (0.02, 0.03)
     assert all(name in parameter_names(fig6) for name in ranges)
     assert parameter_unit(fig6, "cable.diameter") == "m"
+
+
+def test_the_numbers_of_a_station_have_names():
+    """What a sweep of `station.…` changes: a bandwidth, a whole list, an element of one."""
+    turn = scenarios.load("rov_turn")
+    changes = {"station.bandwidth_rad_s": 0.5, "station.depth_m": 30.0, "station.heading_deg[2]": 90.0}
+    changed = with_parameters(turn, changes).station
+    assert changed.bandwidth == 0.5
+    assert [place[2] for place in changed.place] == [30.0] * 5
+    assert changed.heading == pytest.approx(np.radians([0.0, 0.0, 90.0, 180.0, -180.0]))
+    assert changed.time == turn.station.time
+    assert parameter(turn, "station.bandwidth_rad_s") == turn.station.bandwidth
+    assert parameter_unit(turn, "station.heading_deg") == "degree"
+    with pytest.raises(scenarios.ScenarioError, match=r"Did you mean 'station\.bandwidth_rad_s'\?"):
+        with_parameters(turn, {"station.bandwith_rad_s": 0.5})
+    with pytest.raises(scenarios.ScenarioError, match="the trial has no such number"):
+        with_parameters(scenarios.load("fig6"), {"station.depth_m": 3.0})

@@ -2,7 +2,7 @@
 damping of a hull that thrusters drive, and of its tether.
 
 A vehicle without a list has none of these, and its catalogue is as it was. Station keeping knows nothing of a lost
-command: it is the actuator that does less than it is told.
+command: it is the actuator that does less than commanded.
 """
 
 from __future__ import annotations
