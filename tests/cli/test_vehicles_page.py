@@ -100,3 +100,14 @@ def test_fins_masses_engines_and_commands_of_the_page_are_a_vehicle_and_a_trial(
         "battery_turn",
         "bladder",
     )
+
+
+def test_the_python_of_the_page_runs():
+    first, second = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
+    names: dict = {}
+    exec(first, names)
+    assert names["rov"].observation.surge_speed > 0.0
+    exec(second, names)
+    assert names["steady"].state[7] == 0.1
+    assert "front_port_command" in names["linear"].input_labels
+    assert names["hover"].wet_length == 60.0
