@@ -27,7 +27,7 @@ from subzero.arguments import checked_arguments
 from subzero.channels import Observation
 from subzero.errors import BadValueError, checked, missing_extra, short, whole
 from subzero.model import load
-from subzero.simulation.stepper import RunStoppedError, Simulator
+from subzero.simulation.stepper import RunStoppedError, Simulator, hold_together
 
 try:
     import gymnasium
@@ -41,10 +41,6 @@ LARGEST_TURN = radians(30.0)
 """New headings lie within this of the one at the start. [rad]"""
 RUDDER_PRICE = 0.1
 """How much a rudder command at its limit costs, in rad² of heading error."""
-
-MANY_EXCHANGES = 10
-"""A step of so many exchanges of vehicle and cable, a second of fig6, takes 0.3 ms and more: from there on threads pay.
-One of a single exchange takes 0.05 ms, and to hand Python's lock over takes half of that. [-]"""
 
 MOST_ENVIRONMENTS = 100_000
 """More of them are a slip of the pen: each takes a tenth of a megabyte and more. [-]"""
@@ -152,21 +148,20 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
     def hold(self, share: float) -> bool:
         """Hold the rudder at a share of its limit for one sample time; return whether the simulation stopped."""
         try:
-            self._sim.hold(self._propeller, self._most * share + 0.0, 0.0, 0.0)  # + 0.0: no negative zero
+            self._sim.hold(*self.order(share))
             stopped = False
         except RunStoppedError:
             stopped = True
         self._taken += 1
         return stopped
 
+    def order(self, share: float) -> tuple[float, float, float, float]:
+        """Return the command with the rudder at a share of its limit: propeller [rev/s], three fins [rad]."""
+        return self._propeller, self._most * share + 0.0, 0.0, 0.0  # + 0.0: no negative zero
+
     def reward(self, error: float, share: float) -> float:
         """Return the reward of a sample time: heading error at its end [rad], rudder as a share of its limit."""
         return -(error**2 + RUDDER_PRICE * share**2) * self._sim.sample_time
-
-    @property
-    def exchanges(self) -> int:
-        """How many exchanges of vehicle and cable a step takes."""
-        return round(self._sim.sample_time / self._sim.trial.cable_step)
 
     @property
     def is_over(self) -> bool:
@@ -199,6 +194,15 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         return dict(zip(TRUTH, (self._wanted, *self._sim.seen.tolist()), strict=True))
 
 
+def hold_all(environments: Sequence[TetheredHeading], shares: Sequence[float]) -> list[bool]:
+    """Hold the rudders of some environments of one kind as `TetheredHeading.hold` does, in one compiled call."""
+    orders = np.array([each.order(share) for each, share in zip(environments, shares, strict=True)])
+    stopped = hold_together([each._sim for each in environments], orders)
+    for each in environments:
+        each._taken += 1
+    return stopped
+
+
 def _shares(actions: Any, count: int) -> list[float]:
     """Return so many rudders, each as a share of its limit; raise an error for others; plain code, as it is in
     loops.
@@ -221,8 +225,7 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
 
     Args:
         num_envs: how many.
-        workers: threads; if not given, one for each processor where a step takes `MANY_EXCHANGES`, else one
-            (``python -m benchmarks.throughput --learning``).
+        workers: threads, one for each processor if not given (``python -m benchmarks.throughput --learning``).
         **how: of each, see `TetheredHeading`.
     """
 
@@ -231,8 +234,7 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         num_envs = int(checked("TetheredHeadings", "num_envs", num_envs, least=1, most=MOST_ENVIRONMENTS))
         super().__init__([lambda: TetheredHeading(**how)] * num_envs)
         self._ours: list[Any] = list(self.envs)
-        if workers is None:
-            workers = (os.cpu_count() or 1) if self._ours[0].exchanges >= MANY_EXCHANGES else 1
+        workers = (os.cpu_count() or 1) if workers is None else workers
         threads = min(whole("TetheredHeadings: workers", workers, least=1), num_envs)
         self._mine, *self._others = (part.tolist() for part in np.array_split(np.arange(num_envs), threads))
         self._pool = ThreadPoolExecutor(threads)
@@ -255,6 +257,8 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
 
     def _held(self, which: list[int], rudders: list[float]) -> list[bool]:
         """Step some environments, or start them again where an episode is over; return which simulations stopped."""
+        if not self._autoreset_envs[which].any():
+            return hold_all([self._ours[i] for i in which], [rudders[i] for i in which])
         for i in which:
             if self._autoreset_envs[i]:
                 self._ours[i].reset()

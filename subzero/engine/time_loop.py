@@ -177,6 +177,22 @@ def advance(
 
 
 @allocating
+def advance_all(handles: Any, at: Any, seen: Any, count: int, orders: np.ndarray) -> None:
+    """Take so many exchanges of each of some runs, one after another: Python's lock is let go of once, not each time.
+
+    Args:
+        handles: of the runs, a tuple.
+        at: where each stands, a tuple of arrays; changed, with its ending.
+        seen: what each has filled, a tuple of arrays.
+        count: how many exchanges.
+        orders: command of each (runs, 4), in the units of `advance`.
+    """
+    for i in range(len(handles)):
+        n, rudder, port, starboard = orders[i, 0], orders[i, 1], orders[i, 2], orders[i, 3]
+        advance(handles[i], at[i], count, n, rudder, port, starboard, seen[i])
+
+
+@allocating
 def observe(handle: Any, row: int, seen: np.ndarray) -> None:
     """Fill `seen` with a row; the heading goes on from the one that stands there, without jumps."""
     r, before = handle.recording, seen[6]

@@ -15,6 +15,7 @@ from typing import Any, TypeVar, cast
 
 import numba
 import numba.extending
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 
 from subzero.jit.machine_code import MachineCode
@@ -97,7 +98,8 @@ class Kernel(CPUDispatcher):  # type: ignore[misc]  # numba has no types
 
     def compile(self, signature: Any) -> Any:
         """Compile or load the function for a signature."""
-        with _undisturbed(), _named_by(self.py_func, signature):
+        # The name and the settings are those of one compilation: runs in threads wait for each other here.
+        with global_compiler_lock, _undisturbed(), _named_by(self.py_func, signature):
             return super().compile(signature)
 
     def get_call_template(self, arguments: Any, named: Any) -> Any:

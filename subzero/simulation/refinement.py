@@ -16,6 +16,8 @@ ill-posed drum may be the same on segments of one and of half a metre. So every 
 finer ones can settle (`subzero.validity.refinement_that_settles`) is compared with runs two, four and, where it must
 be, eight times as fine, of which the first that contradicts is the last (`prove`). What they change is its error.
 
+The coarse run is made in a second thread while the first makes the run itself: compiled code lets go of Python's lock.
+
 All of these runs share one `Budget`: `[run] budget_s`, or else ten times the work of the run as it was asked for, at
 least two seconds of it. It is counted in nodes times iterations, not by a clock, so that the same trial gives the same
 numbers on every machine. A run of an ill-posed problem takes ever more iterations as it is refined, so the budget ends
@@ -32,9 +34,12 @@ cable that is bent sharply near the drum errs in its segments only, and its step
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from math import inf
+from threading import Event
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -197,8 +202,9 @@ def run_converged(
     if coarser is None or coarse_times.size < 3:
         return take(trial, whole, progress), None
     # The coarse run is there for its force alone, so its energies and shapes are not kept.
-    coarse = _taken(take, coarser, _only_traced(coarse_times, 1), _share(progress, 0.0, 0.2))
-    run = take(trial, whole, _share(progress, 0.2, 0.8))
+    with _beside(take, coarser, _only_traced(coarse_times, 1)) as begun:
+        run = take(trial, whole, progress)
+        coarse = begun.result()
     # The budget depends on the work of the run as asked for, which is known only now.
     budget.grant(run)
     if coarse is None:
@@ -279,6 +285,22 @@ def _taken(take: Take, trial: scenarios.Trial, grid: Grid, progress: Progress | 
     # A refusal, such as for memory, is a user's error elsewhere; here it means that no comparison is possible.
     except UserError:
         return None
+
+
+@contextmanager
+def _beside(take: Take, trial: scenarios.Trial, grid: Grid) -> Iterator[Future[Run | None]]:
+    """Make a run as `_taken` does in a second thread; leaving the block early ends it soon, and waits for that."""
+    ended = Event()
+
+    def go_on(_: float) -> None:
+        if ended.is_set():
+            raise CancelledError
+
+    with ThreadPoolExecutor(1) as second:
+        try:
+            yield second.submit(_taken, take, trial, grid, go_on)
+        finally:
+            ended.set()
 
 
 def resolved(trial: scenarios.Trial, factor: float) -> scenarios.Trial | None:

@@ -94,19 +94,19 @@ def test_many_at_once_are_those_of_one_after_another_to_the_last_bit(monkeypatch
             np.testing.assert_array_equal(ours, plain[-1][key])
 
 
-@pytest.mark.parametrize("how, threads", [({}, 1), ({"sample_time": 1.0}, 2), ({"workers": 2}, 2)])
-def test_threads_are_for_long_steps_and_for_who_asks(monkeypatch, how, threads):
-    """On a machine of two processors: a step of ten exchanges is long, one of a single exchange is not."""
-    one, used, meet = subzero.gym_environment.TetheredHeading, set(), threading.Barrier(threads)
-    hold = one.hold
+@pytest.mark.parametrize("how, threads", [({}, 2), ({"sample_time": 1.0}, 2), ({"workers": 1}, 1)])
+def test_each_processor_has_a_thread_if_nothing_else_is_asked_for(monkeypatch, how, threads):
+    """On a machine of two processors."""
+    ours, used, meet = subzero.gym_environment, set(), threading.Barrier(threads)
+    hold_all = ours.hold_all
 
-    def seen_to_hold(self, share):
+    def seen_to_hold(*how):
         used.add(threading.get_ident())
         meet.wait(timeout=60.0)  # until as many are here as there are threads
-        return hold(self, share)
+        return hold_all(*how)
 
-    monkeypatch.setattr(subzero.gym_environment.os, "cpu_count", lambda: 2)
-    monkeypatch.setattr(one, "hold", seen_to_hold)
+    monkeypatch.setattr(ours.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(ours, "hold_all", seen_to_hold)
     made = gymnasium.make_vec(subzero.gym_environment.ENVIRONMENT, num_envs=2, **how)
     made.reset(seed=1)
     made.step(np.zeros((2, 1), dtype=np.float32))

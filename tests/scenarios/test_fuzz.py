@@ -125,7 +125,7 @@ def is_usable(trial):
             assert isinstance(values, str) or np.isfinite(np.array(values)).all()
     for samples in (trial.commands, trial.motion):
         for values in vars(samples).values() if samples else ():
-            if values is None or isinstance(values, str):
+            if values is None or isinstance(values, str | tuple):  # names of columns
                 continue
             assert values.dtype == float
             assert np.isfinite(values).all()
