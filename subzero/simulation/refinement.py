@@ -38,6 +38,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cache
 from math import inf
 from threading import Event
 from typing import TYPE_CHECKING
@@ -203,8 +204,14 @@ def run_converged(
         return take(trial, whole, progress), None
     # The coarse run is there for its force alone, so its energies and shapes are not kept.
     with _beside(take, coarser, _only_traced(coarse_times, 1)) as begun:
-        run = take(trial, whole, progress)
-        coarse = begun.result()
+
+        def reported(fraction: float) -> None:
+            begun()  # not before: the first thread compiles, as no signal breaks in on that
+            if progress is not None:
+                progress(fraction)
+
+        run = take(trial, whole, reported)
+        coarse = begun().result()
     # The budget depends on the work of the run as asked for, which is known only now.
     budget.grant(run)
     if coarse is None:
@@ -288,8 +295,11 @@ def _taken(take: Take, trial: scenarios.Trial, grid: Grid, progress: Progress | 
 
 
 @contextmanager
-def _beside(take: Take, trial: scenarios.Trial, grid: Grid) -> Iterator[Future[Run | None]]:
-    """Make a run as `_taken` does in a second thread; leaving the block early ends it soon, and waits for that."""
+def _beside(take: Take, trial: scenarios.Trial, grid: Grid) -> Iterator[Callable[[], Future[Run | None]]]:
+    """Return a function that makes a run as `_taken` does in a second thread, from its first call on.
+
+    Leaving the block ends a run that nobody waited for soon, and waits for that.
+    """
     ended = Event()
 
     def go_on(_: float) -> None:
@@ -298,7 +308,7 @@ def _beside(take: Take, trial: scenarios.Trial, grid: Grid) -> Iterator[Future[R
 
     with ThreadPoolExecutor(1) as second:
         try:
-            yield second.submit(_taken, take, trial, grid, go_on)
+            yield cache(lambda: second.submit(_taken, take, trial, grid, go_on))
         finally:
             ended.set()
 

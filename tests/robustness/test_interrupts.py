@@ -18,12 +18,14 @@ import random
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections import Counter
 from pathlib import Path
 
 import pytest
 
+import subzero
 from subzero.cli.app import INTERRUPTED
 from subzero.files.atomic_output import TEMPORARY
 from subzero.files.read_file import INCOMPLETE
@@ -55,6 +57,18 @@ def interrupted_in_process(seed, count, what):
 @pytest.mark.long
 def test_after_an_interrupt_the_next_call_gives_the_same_numbers():
     assert len(interrupted_in_process(1, SHORT, "few")["where"]) > 3
+
+
+def test_a_run_that_is_broken_off_leaves_no_thread_behind():
+    before = threading.active_count()
+
+    def broken_off(_):
+        raise KeyboardInterrupt
+
+    for trial in ("fig6", "rov_hover"):
+        with pytest.raises(KeyboardInterrupt):
+            subzero.simulate(trial, progress=broken_off)
+    assert threading.active_count() == before
 
 
 @pytest.mark.slow
