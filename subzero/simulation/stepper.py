@@ -23,6 +23,7 @@ the same commands give the same numbers, to the last bit.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import islice
 from math import isfinite, pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -231,11 +232,12 @@ class Simulator:
     def _checked(self, command: Command) -> list[float]:
         """Return a command as floats: four, and one for each channel if any of them is given."""
         given = self._by_name(command) if isinstance(command, Mapping) else command
+        every = len(FOUR) + len(self._channels)
         try:
-            numbers = [float(value + 0.0) for value in given]  # no text is a number
+            numbers = [float(value + 0.0) for value in islice(given, every + 1)]  # no text is a number
         except (TypeError, ValueError, OverflowError):
             numbers = []
-        if len(numbers) in (len(FOUR), len(FOUR) + len(self._channels)) and all(map(isfinite, numbers)):
+        if len(numbers) in (len(FOUR), every) and all(map(isfinite, numbers)):
             self._check_station(numbers)
             return numbers
         listed = f"; or these and those of {', '.join(self._channels)}" if self._channels else ""

@@ -79,10 +79,12 @@ LEGAL = {
         "simulate_many.workers Design.seed TetheredHeading.reset.seed TetheredHeadings.workers",
     "{}":
         "with_changes.changes catalogue.channels catalogue.more all_effects.more apply_extended.effects "
-        "extended_toml.effects unseen.effects plan_sweep.changes TetheredHeading.reset.options",
+        "extended_toml.effects unseen.effects plan_sweep.changes TetheredHeading.reset.options "
+        "Simulator.step.command",
     "empty dataset":
         "with_changes.changes catalogue.channels catalogue.more all_effects.more apply_extended.effects "
-        "extended_toml.effects unseen.effects warnings_of.run plan_sweep.changes TetheredHeading.reset.options",
+        "extended_toml.effects unseen.effects warnings_of.run plan_sweep.changes TetheredHeading.reset.options "
+        "Simulator.step.command",
     "-1":
         "with_onset.time with_free_onset.time with_free_onset.end TetheredHeading.propeller_rps turn.turn "
         "TetheredHeading.step.action Current.at.time pull_out.surface tow.surface hold.surface",
