@@ -57,7 +57,11 @@ class Commands:
         """Raise an error if the fields do not form commands; keep arrays of their own that cannot be changed."""
         check = Checks(self)
         time = check.rows("time", COMMANDS[:1])
-        further = tuple(replace(ANY_COMMAND, name=str(name)) for name in self.listed)
+        if not (isinstance(self.listed, list | tuple) and all(isinstance(name, str) for name in self.listed)):
+            check.say("listed", "these are no names", "Give a tuple of texts.", self.listed)
+            check.refuse()
+        object.__setattr__(self, "listed", tuple(self.listed))
+        further = tuple(replace(ANY_COMMAND, name=name) for name in self.listed)
         values = check.rows("values", COMMANDS[1:] + further, None if time is None else time.size)
         if time is not None:
             check.increasing("time", time)

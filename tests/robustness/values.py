@@ -35,6 +35,8 @@ from scenarios.parameters import with_vehicle
 from subzero import autopilot
 from subzero.external_force import MissingForce, Term
 from vehicle import Vehicle, from_mapping
+from vehicle.box_sections import HullSection
+from vehicle.rigid_body import ProductsOfInertia
 
 ROWS = 5
 """So many results of a run are enough to see whether it stands."""
@@ -205,6 +207,11 @@ LISTED = {
     )
 }
 """A listed actuator of each kind."""
+NPS = from_mapping(with_vehicle(FIG6, "nps_auv2")[0].vehicle)
+FURTHER = {"products_of_inertia": ProductsOfInertia(xy=0.01, xz=0.02, yz=-0.01), "race": NPS.race}
+"""Sections that the vehicle of fig6 does not have."""
+STATIONS = NPS.sections
+"""Stations of a hull, by name."""
 
 
 def fields_of(value: Any) -> dict[str, Any]:
@@ -439,8 +446,17 @@ def targets() -> list[Target]:
         Target("manoeuvre", {"name": "crash_stop", "size": 1.0, "speed": 1.0}, manoeuvred),
     ]  # fmt: skip
     for name, section in fields_of(MODEL.vehicle).items():
-        if name not in LISTED:  # tables, below
+        if name not in {*LISTED, *FURTHER, "sections"}:  # below
             found.append(made(type(section), section, with_section(name)))
+    for name, section in FURTHER.items():
+        found.append(made(type(section), section, with_section(name)))
+    found.append(
+        made(
+            HullSection,
+            STATIONS[0][1],
+            lambda part: with_section("sections")((("first", part), *STATIONS[1:])),
+        )
+    )
     for name, part in LISTED.items():
         found.append(made(type(part), part, lambda part, name=name: with_section(name)((("first", part),))))
     return found
