@@ -15,10 +15,10 @@ from scenarios.heading import TURN
 from scenarios.steps import sample_times
 from subzero.arguments import checked_arguments
 from subzero.channels import HEADING, TIME, column_name
-from subzero.diagnosis.hypothesis.catalogue import START, catalogue
+from subzero.diagnosis.hypothesis.catalogue import START, catalogue, with_own
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect
-from subzero.diagnosis.hypothesis.hypotheses import with_tolerances
+from subzero.diagnosis.hypothesis.hypotheses import is_absent, moves_nothing, with_tolerances
 from subzero.errors import UserError, checked, chosen, printable, whole
 from subzero.model import Model, load
 from subzero.records.consistency import REPORTED_COMMANDS
@@ -90,13 +90,13 @@ def challenge(
     if kind is not None:
         chosen(KIND_PROBABILITIES, kind, "kind of challenge")
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
-    if trial.commands is None:
+    if trial.motion is not None:
         raise UserError(
             f"The scenario {trial.name} prescribes the motion: whatever is wrong, the vehicle moves alike. "
-            "Take a trial with commands, such as fig6."
+            "Take one that commands its vehicle, such as fig6."
         )
     nominal = Setting(trial=trial, model=Model.of(trial))
-    effects = {key: with_tolerances(effect, nominal) for key, effect in catalogue(BASIC).items()}
+    effects = _possible(nominal)
     both = (*effects.values(), *START)
     times = sample_times(trial.duration, SAMPLE_S)
     for attempt in range(10):
@@ -113,6 +113,16 @@ def challenge(
             write(made, Path(folder), scenario)
         return made
     raise UserError(f"Nothing that seed {seed} draws can be flown on '{trial.name}'. Try another seed.")
+
+
+def _possible(nominal: Setting) -> dict[str, Effect]:
+    """Return the effects that can be hidden in a trial, those of the lists of its vehicle among them."""
+    known = catalogue(BASIC, with_own((), nominal.model.vehicle))
+    return {
+        key: with_tolerances(effect, nominal)
+        for key, effect in known.items()
+        if not is_absent(effect, nominal) and not moves_nothing(effect, nominal)
+    }
 
 
 def _answer(

@@ -81,7 +81,7 @@ def _correlations(record: Observed, noise: Noise, difference: np.ndarray) -> dic
     residual = np.where(noise.used, difference, 0.0)
     residual = np.where(noise.used, residual - np.mean(difference[noise.used]), 0.0)
     step, found = float(np.median(np.diff(record.time))), {}
-    for name, column in zip(COMMANDS, held.T, strict=True):
+    for name, column in zip((*COMMANDS, *commands.listed), held.T, strict=True):
         x = column - np.mean(column)
         scale = np.linalg.norm(x) * np.linalg.norm(residual)
         if scale > 0.0:

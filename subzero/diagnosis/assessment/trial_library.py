@@ -40,9 +40,11 @@ def fastest(setting: Setting) -> float:
 
 
 def flown(setting: Setting, rows: Sequence[Row], duration: float) -> Setting:
-    """Return the setting with other commands and another duration. [s]"""
-    table = np.array(rows, dtype=float)
-    commands = scenarios.Commands(time=table[:, 0].copy(), values=np.ascontiguousarray(table[:, 1:]))
+    """Return the setting with other commands and another duration [s]; those of listed actuators stay as they are."""
+    table, before = np.array(rows, dtype=float), setting.trial.commands
+    assert before is not None
+    values = np.column_stack([table[:, 1:], before.at(table[:, 0])[:, table.shape[1] - 1 :]])
+    commands = scenarios.Commands(time=table[:, 0].copy(), values=values, listed=before.listed)
     return replace(setting, trial=replace(setting.trial, commands=commands, duration=duration, motion=None))
 
 
@@ -50,7 +52,8 @@ def rows_of(setting: Setting) -> tuple[Row, ...]:
     """Return the commands of a setting as rows."""
     commands = setting.trial.commands
     assert commands is not None
-    return tuple((float(t), *map(float, row)) for t, row in zip(commands.time, commands.values, strict=True))  # type: ignore[misc]
+    four = commands.values[:, :4]
+    return tuple((float(t), *map(float, row)) for t, row in zip(commands.time, four, strict=True))  # type: ignore[misc]
 
 
 def _rudder(setting: Setting, steps: Sequence[tuple[float, float]], duration: float) -> Setting:

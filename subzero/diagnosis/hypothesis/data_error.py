@@ -26,7 +26,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-import scenarios
 from scenarios.heading import TURN, continuous, turned
 from subzero.channels import BY_NAME, HEADING
 from subzero.diagnosis.hypothesis.logged import Logged
@@ -335,7 +334,7 @@ def _spread(values: np.ndarray, place: np.ndarray, size: int) -> np.ndarray:
 def _with_commands(logged: Logged, values: np.ndarray) -> Logged:
     trial = logged.setting.trial
     assert trial.commands is not None
-    commands = scenarios.Commands(time=trial.commands.time, values=values)
+    commands = dataclasses.replace(trial.commands, values=values)
     setting = dataclasses.replace(logged.setting, trial=dataclasses.replace(trial, commands=commands))
     return dataclasses.replace(logged, setting=setting)
 

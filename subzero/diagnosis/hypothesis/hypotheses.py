@@ -115,6 +115,16 @@ def _moved(effect: Effect, at: int, setting: Setting) -> Setting:
     )
 
 
+def is_absent(effect: Effect, nominal: Setting) -> bool:
+    """Say whether a cause of propeller, rudder or stern-planes has nothing to act on in a vehicle without them."""
+    hull = nominal.model.vehicle
+    if ":" in effect.id:  # of a sensor or a listed actuator, by its name
+        return False
+    absent = {"propulsion": not hull.propeller.thrust_constant > 0.0, "fins": False}
+    absent["fins"] = not (hull.fins or hull.rudder.area > 0.0 or hull.stern_planes.area > 0.0)
+    return absent.get(effect.slot, False)
+
+
 def moves_nothing(effect: Effect, setting: Setting) -> bool:
     """Say whether an effect changes nothing in a setting: a share of a number that is zero there."""
     moved = [_moved(effect, at, setting) for at in range(len(effect.parameters))]

@@ -19,7 +19,7 @@ from scenarios.heading import turned
 from subzero.channels import HEADING
 from subzero.diagnosis.hypothesis.catalogue import ONSETS, SAMPLED, START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import CLOCK, SPECS
-from subzero.diagnosis.hypothesis.hypotheses import entries_of, moves_nothing, with_tolerances
+from subzero.diagnosis.hypothesis.hypotheses import entries_of, is_absent, moves_nothing, with_tolerances
 from subzero.diagnosis.hypothesis.noise import (
     Noise,
     SensorPrior,
@@ -75,11 +75,11 @@ def pose(records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
         replace(effect, parameters=tuple(parameter.within(nominal) for parameter in effect.parameters))
         for effect in (with_tolerances(trial, nominal) for trial in catalogue(channels, more).values())
         if _possible(effect, observed)
-        and not _is_absent(effect, nominal)
+        and not is_absent(effect, nominal)
         and not moves_nothing(effect, nominal)
     ]
     onsets = tuple(
-        effect for effect in ONSETS if _possible(effect, observed) and not _is_absent(effect, nominal)
+        effect for effect in ONSETS if _possible(effect, observed) and not is_absent(effect, nominal)
     )
     own = (*START, SAMPLED) if any(trial.setting.intervals for trial in observed) else START
     return Problem(records=observed, entries=entries_of(effects, own, len(observed)), onsets=onsets)
@@ -117,16 +117,6 @@ def _possible(effect: Effect, observed: Sequence[Observed]) -> bool:
     tethered = any(trial.setting.tethered for trial in observed)
     winch = any(trial.setting.model.winch is not None for trial in observed)
     return (effect.slot not in ("cable", "drum") or tethered) and not (effect.slot == "drum" and winch)
-
-
-def _is_absent(effect: Effect, nominal: Setting) -> bool:
-    """Say whether a cause of propeller, rudder or stern-planes has nothing to act on in a vehicle without them."""
-    hull = nominal.model.vehicle
-    if ":" in effect.id:  # of a sensor or a listed actuator, by its name
-        return False
-    absent = {"propulsion": not hull.propeller.thrust_constant > 0.0, "fins": False}
-    absent["fins"] = not (hull.fins or hull.rudder.area > 0.0 or hull.stern_planes.area > 0.0)
-    return absent.get(effect.slot, False)
 
 
 def _observed(trial: Logged) -> Observed:

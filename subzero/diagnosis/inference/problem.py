@@ -213,7 +213,8 @@ class Problem:
         for k, i, moved in jobs:
             track, known = (base[i], true[i]) if self._late(k) else (next(runs), None)
             change = self.whitened(i, self.setting(i, moved), track, true=known) - shown[i]
-            J[first[i] : first[i + 1], k] = change / (moved[k] - z[k])
+            if moved[k] != z[k]:  # a number that is zero has no tolerance in shares of itself
+                J[first[i] : first[i + 1], k] = change / (moved[k] - z[k])
         return np.nan_to_num(J)
 
     def change(self, z: np.ndarray, moved: np.ndarray) -> np.ndarray:
