@@ -103,10 +103,10 @@ def _check(logged: Sequence[Logged]) -> None:
         raise UserError(NO_RECORD)
     first = logged[0]
     for trial in logged:
-        if trial.setting.trial.motion is not None:
+        if trial.setting.trial.commands is None:
             raise UserError(
                 f"The trial of '{trial.name}' prescribes the motion: it moves alike with any numbers. "
-                "Calibrate with trials that command the vehicle."
+                "Calibrate with trials that give commands."
             )
     for each in logged[1:]:
         if each.setting.model.vehicle != first.setting.model.vehicle:

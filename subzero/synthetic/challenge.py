@@ -90,7 +90,7 @@ def challenge(
     if kind is not None:
         chosen(KIND_PROBABILITIES, kind, "kind of challenge")
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
-    if trial.motion is not None:
+    if trial.commands is None and trial.station is None:
         raise UserError(
             f"The scenario {trial.name} prescribes the motion: whatever is wrong, the vehicle moves alike. "
             "Take one that commands its vehicle, such as fig6."
