@@ -203,15 +203,15 @@ def run_converged(
     if coarser is None or coarse_times.size < 3:
         return take(trial, whole, progress), None
     # The coarse run is there for its force alone, so its energies and shapes are not kept.
-    with _beside(take, coarser, _only_traced(coarse_times, 1)) as begun:
+    with _second_run(take, coarser, _only_traced(coarse_times, 1)) as started:
 
         def reported(fraction: float) -> None:
-            begun()  # not before: the first thread compiles, as no signal breaks in on that
+            started()  # not before: the first thread compiles, as no signal breaks in on that
             if progress is not None:
                 progress(fraction)
 
         run = take(trial, whole, reported)
-        coarse = begun().result()
+        coarse = started().result()
     # The budget depends on the work of the run as asked for, which is known only now.
     budget.grant(run)
     if coarse is None:
@@ -295,10 +295,10 @@ def _taken(take: Take, trial: scenarios.Trial, grid: Grid, progress: Progress | 
 
 
 @contextmanager
-def _beside(take: Take, trial: scenarios.Trial, grid: Grid) -> Iterator[Callable[[], Future[Run | None]]]:
+def _second_run(take: Take, trial: scenarios.Trial, grid: Grid) -> Iterator[Callable[[], Future[Run | None]]]:
     """Return a function that makes a run as `_taken` does in a second thread, from its first call on.
 
-    Leaving the block ends a run that nobody waited for soon, and waits for that.
+    Leaving the block ends a run whose result was not awaited, soon, and waits for that.
     """
     ended = Event()
 

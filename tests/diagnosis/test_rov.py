@@ -121,24 +121,3 @@ def test_a_log_may_hold_the_commands_of_thrusters_and_they_can_be_flown(tmp_path
     np.testing.assert_allclose(again["depth"].values[close], run["depth"].values[close], atol=0.02)
     (kept,) = read_trials(tmp_path / "log.csv", scenario=trial_file)
     assert kept.setting.trial.station is not None
-
-
-def test_a_glider_that_is_as_its_model_says_gets_no_name(tmp_path):
-    """Its commands are those of its lists: battery and bladder."""
-    path = tmp_path / "glider.toml"
-    path.write_text(
-        subzero.load_scenario("glider_sawtooth").text.replace("duration_s = 900.0", "duration_s = 40.0")
-    )
-    glider = subzero.load_scenario(path)
-    time, random = np.arange(0.5, 40.5, 0.5), np.random.default_rng(1)
-    true = respond(Setting(trial=glider, model=subzero.Model.of(glider)), time, CHANNELS[:6])
-    values = {name: column + NOISE[name] * random.standard_normal(time.size) for name, column in true.items()}
-    verdict = diagnose(Record(source="glide.csv", time=time, values=values), path, budget="verdict")
-    assert (verdict.verdict, verdict.causes) == ("nothing_wrong", ())
-
-
-@pytest.mark.long
-def test_a_weak_thruster_can_be_hidden_in_a_challenge():
-    hidden = subzero.challenge(HOVER, seed=0)
-    assert hidden.answer.names[0].startswith("thruster:")
-    assert "propeller_thrust_gain" not in hidden.answer.tolerances, "there is no propeller"

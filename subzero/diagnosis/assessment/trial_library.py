@@ -40,7 +40,7 @@ def fastest(setting: Setting) -> float:
 
 
 def flown(setting: Setting, rows: Sequence[Row], duration: float) -> Setting:
-    """Return the setting with other commands and another duration [s]; those of listed actuators stay as they are."""
+    """Return the setting with other commands and another duration [s]; listed actuators keep theirs."""
     table, before = np.array(rows, dtype=float), setting.trial.commands
     assert before is not None
     values = np.column_stack([table[:, 1:], before.at(table[:, 0])[:, table.shape[1] - 1 :]])
