@@ -191,11 +191,15 @@ class Search:
         """Return explanations with one term more with their scores, ranked with their own noise."""
         if len(base.terms) >= MOST_TERMS:
             return []
+        if id(base) in self._added:
+            return self._added[id(base)][1]
         again = []
         for linear in self._worth_own_noise(self._additions(base)):
-            own = replace(linear, levels=fitted_levels(self.problem, linear, sweeps=1))
+            own = replace(linear, levels=fitted_levels(self.problem, linear))
             again.append((self._linear_score(own), own))
-        return self._distinct(sorted(again, key=lambda pair: -pair[0]))
+        found = self._distinct(sorted(again, key=lambda pair: -pair[0]))
+        self._added[id(base)] = (base, found)  # kept with its base, so that no other can take its identity
+        return found
 
     def _worth_own_noise(self, ranked: list[tuple[float, Linear]]) -> Iterator[Linear]:
         """Yield the best, ranked with the noise of the explanation that they are added to, and ranked with usual noise,
@@ -214,14 +218,10 @@ class Search:
 
     def _additions(self, base: Linear) -> list[tuple[float, Linear]]:
         """Return explanations with one term more, linearised, with their scores: the best first."""
-        if id(base) in self._added:
-            return self._added[id(base)][1]
         present = {term.id for term in base.terms}
         worth = [term for term in suggested(self.problem, base, self._terms) if term.id not in present]
         found = [(self._linear_score(linear), linear) for term in worth for linear in self.added(base, term)]
-        found.sort(key=lambda pair: -pair[0])
-        self._added[id(base)] = (base, found)  # kept with its base, so that no other can take its identity
-        return found
+        return sorted(found, key=lambda pair: -pair[0])
 
     def added(self, base: Linear, term: Term) -> Iterator[Linear]:
         """Yield an explanation with a term more, if it can be simulated where the term begins."""
