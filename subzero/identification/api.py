@@ -324,7 +324,7 @@ def _visible_from(search: Search) -> dict[str, str]:
     for term in declared(search.problem):
         if term.kind not in ("scale", "offset", "delay", "cause") or math.isfinite(term.begins) or term.size:
             continue
-        for linear in search.added(base, term):
+        if (linear := search.there(base, with_term(base.terms, term), term)) is not None:
             for name, size, unit in _sizes(search.problem, linear, term):
                 found.setdefault(name, f"{size:.2g}{unit}")
     return found

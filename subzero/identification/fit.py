@@ -389,12 +389,14 @@ def _is_linear(problem: Problem, origin: Linear, there: Linear) -> bool:
     """Return whether sensitivities of one point still hold at another: what they miss of the change of the residuals is
     little, or a small share of it.
     """
-    moved, missed = 0.0, 0.0
+    moved = missed = 0.0
     for name, e in there.e.items():
-        used, level = problem.used(name, there.terms), there.levels.noise[name].white
         change = origin.J[name] @ (there.x - origin.x)
-        moved += float(np.sum((change[used] / level) ** 2))
-        missed += float(np.sum(((origin.e[name] - change - e)[used] / level) ** 2))
+        left = origin.e[name] - change - e
+        for _, times, both in _blocks(problem, name, there.terms, change[:, None], left):
+            filtered = Filter.of(there.levels.noise[name], problem.channels[name].prior.resolution, times)
+            squares = np.sum(filtered.whiten(both) ** 2, axis=0)
+            moved, missed = moved + float(np.sum(squares[:-1])), missed + float(squares[-1])
     return missed < max(2.0 * ENOUGH, SLOPE_ERROR**2 * moved)
 
 

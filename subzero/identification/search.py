@@ -1,7 +1,8 @@
 """The search for explanations: ranked in the linear problem, the best fitted with simulations; add, drop, swap.
 
 It begins twice: at the nominal model, where gross errors in the data are plain whatever a fit would bend, and at the
-fit of "nothing is wrong".
+fit of "nothing is wrong". Without a gross error a fit bends the model to the wrong readings: what may stand in its place
+is judged where the fit with it ends.
 """
 
 from __future__ import annotations
@@ -28,12 +29,15 @@ from subzero.identification.problem import Problem, Progress
 
 MOST_TERMS = 8
 """An explanation has no more terms."""
-RANKED_AGAIN, FITTED = 10, 6
-"""So many of the best are ranked again with their own noise; at most so many of these are fitted."""
+RANKED_AGAIN, FITTED, REPLACED = 10, 6, 3
+"""So many of the best are ranked again with their own noise; at most so many of these are fitted; and of errors of one
+channel in the place of a gross one."""
 WITHIN = 5.0
 """Explanations within this of the best are expanded, too. [nats]"""
-WORTH, STEP_WORTH = 3.0, 1.0
-"""A term that is ranked to lose more is not fitted; one that gains less ends the way from the nominal model. [nats]"""
+WORTH, GROSS = 3.0, 100.0
+"""A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one. [nats]"""
+SAME_POINT = 0.3
+"""Columns of a cause serve while no number of the model moves by more, in standard deviations of its prior. [-]"""
 OF_MODEL = ("number", "start", "unknown")
 """Kinds of entries that every explanation has."""
 TWINS = ("offset", "scale", "affine", "delay")
@@ -72,6 +76,9 @@ class Search:
         self._expanded: set[Key] = set()
         self._tried: set[Key] = set()
         self._added: dict[int, tuple[Linear, list[tuple[float, Linear]]]] = {}
+        self._columns: dict[
+            tuple[str, float], tuple[dict[tuple[str, str, int, int], float], dict[str, np.ndarray]]
+        ] = {}
         self._terms = declared(self.problem)
         self._loggers = {name: sensor.logger for name, sensor in self.problem.model.channels.items()}
 
@@ -92,7 +99,7 @@ class Search:
         )
         chain = self._greedy(nominal) if unexplained(problem, nominal) > OFF_LEVELS else []
         self._fit((), nominal)
-        for linear in chain:
+        for linear in chain[-1:]:
             self._fit(linear.terms, linear)
         while (base := self._next()) is not None:
             if len(self.fits) >= MOST_FITS:
@@ -114,14 +121,36 @@ class Search:
         return None
 
     def _expand(self, base: Fit) -> None:
-        """Fit the best explanations that are one move away."""
+        """Fit the best explanations that are one move away: gross errors in the data first, as all else depends on
+        them.
+        """
+        best = self.ranked()[0]
+        gross = [term for term in base.terms if self._fit_replacements(base, term)]
+        if self.ranked()[0] is not best:
+            return
         self._expanded.add(key(base.terms))
         self._fit_additions(base.linear)
         for term in base.terms:
-            smaller = self._fit(without(base.terms, term), base.linear)
-            self._fit_additions(smaller.linear)
+            if term not in gross:
+                self._fit_additions(self._fit(without(base.terms, term), base.linear).linear)
             for twin in self._twins(term):
-                self._fit(with_term(smaller.terms, twin), base.linear)
+                linear = self.there(base.linear, with_term(without(base.terms, term), twin))
+                if linear and self._own_score(linear) > self.score(base) - GROSS:
+                    self._fit(linear.terms, base.linear)
+
+    def _fit_replacements(self, base: Fit, term: Term) -> bool:
+        """Fit the best explanations with another error of the same channel in the place of a gross one, from the point
+        where the fit with that ends, and return whether it is one.
+        """
+        bare = self.there(base.linear, without(base.terms, term)) if term.is_data_error else None
+        if bare is None or self._own_score(bare) > self.score(base) - GROSS:
+            return False
+        others = [each for each in self._terms if each.is_data_error and each.target == term.target]
+        found = [self._with_own_noise(linear) for _, linear in self._additions(bare, others)]
+        for score, linear in self._distinct(sorted(found, key=lambda pair: -pair[0]))[:REPLACED]:
+            if score > self.score(base) - GROSS:
+                self._fit(linear.terms, linear, score)
+        return True
 
     def _fit_additions(self, base: Linear) -> None:
         """Fit the best explanations with one term more, except those that are ranked far below the best of all fits.
@@ -130,7 +159,7 @@ class Search:
         """
         here = self._linear_score(base)
         for score, linear in self._best_additions(base)[:FITTED]:
-            if score > max(here, self.score(self.ranked()[0]) - WITHIN) - WORTH:
+            if score > max(here - WORTH, self.score(self.ranked()[0]) - WITHIN):
                 self._fit(linear.terms, linear, score)
 
     def _twins(self, term: Term) -> Iterator[Term]:
@@ -173,12 +202,15 @@ class Search:
         return self.fits[name]
 
     def _greedy(self, nominal: Linear) -> list[Linear]:
-        """Return explanations, each with the term more that gains most in the linear problem at the nominal model."""
+        """Return explanations, each with the gross error in the data more that gains most in the linear problem at the
+        nominal model.
+        """
         chain: list[Linear] = []
         here, before = nominal, self._linear_score(nominal)
+        errors = [term for term in self._terms if term.is_data_error]
         while len(here.terms) < MOST_TERMS:
-            added = self._additions(here)
-            if not added or added[0][0] < before + STEP_WORTH:
+            added = self._additions(here, errors)
+            if not added or added[0][0] < before + GROSS:
                 break
             before, here = added[0]
             chain.append(here)
@@ -193,10 +225,10 @@ class Search:
             return []
         if id(base) in self._added:
             return self._added[id(base)][1]
-        again = []
-        for linear in self._worth_own_noise(self._additions(base)):
-            own = replace(linear, levels=fitted_levels(self.problem, linear))
-            again.append((self._linear_score(own), own))
+        again = [
+            self._with_own_noise(linear)
+            for linear in self._worth_own_noise(self._additions(base, self._terms))
+        ]
         found = self._distinct(sorted(again, key=lambda pair: -pair[0]))
         self._added[id(base)] = (base, found)  # kept with its base, so that no other can take its identity
         return found
@@ -216,44 +248,69 @@ class Search:
             found.setdefault(key(linear.terms), (score, linear))
         return list(found.values())
 
-    def _additions(self, base: Linear) -> list[tuple[float, Linear]]:
-        """Return explanations with one term more, linearised, with their scores: the best first."""
+    def _with_own_noise(self, linear: Linear) -> tuple[float, Linear]:
+        """Return an explanation with the noise of its own residuals, and its score."""
+        own = replace(linear, levels=fitted_levels(self.problem, linear))
+        return self._linear_score(own), own
+
+    def _own_score(self, linear: Linear) -> float:
+        return self._with_own_noise(linear)[0]
+
+    def _additions(self, base: Linear, terms: list[Term]) -> list[tuple[float, Linear]]:
+        """Return explanations with one of some terms more, linearised, with their scores: the best first."""
         present = {term.id for term in base.terms}
-        worth = [term for term in suggested(self.problem, base, self._terms) if term.id not in present]
-        found = [(self._linear_score(linear), linear) for term in worth for linear in self.added(base, term)]
+        worth = [term for term in suggested(self.problem, base, terms) if term.id not in present]
+        there = [self.there(base, with_term(base.terms, term), term) for term in worth]
+        found = [(self._linear_score(linear), linear) for linear in there if linear]
         return sorted(found, key=lambda pair: -pair[0])
 
-    def added(self, base: Linear, term: Term) -> Iterator[Linear]:
-        """Yield an explanation with a term more, if it can be simulated where the term begins."""
-        problem, terms = self.problem, with_term(base.terms, term)
-        entries = problem.entries(terms)
+    def _columns_of(
+        self, terms: Terms, entries: list[Entry], x: np.ndarray, fresh: list[int], new: Term | None
+    ) -> dict[str, np.ndarray]:
+        """Return the columns of fresh entries at x; those of a cause that begins switched off are kept while the rest of
+        the model has hardly moved.
+        """
+        off = new is not None and new.kind == "cause" and not new.size
+        if new is None or not off:
+            return self.problem.jacobian(terms, entries, x, fresh)
+        rest = [(entry.identity, value / entry.sd) for entry, value in zip(entries, x.tolist(), strict=True)
+                if entry.kind in OF_MODEL]  # fmt: skip
+        here, name = dict(rest), (new.id, new.begins)
+        if name in self._columns:
+            there, columns = self._columns[name]
+            if there.keys() == here.keys() and max(abs(here[k] - there[k]) for k in here) < SAME_POINT:
+                return columns
+        self._columns[name] = (here, self.problem.jacobian(terms, entries, x, fresh))
+        return self._columns[name][1]
+
+    def there(self, base: Linear, terms: Terms, new: Term | None = None) -> Linear | None:
+        """Return another explanation, linearised at the point of a base, its new term where that begins; None if it
+        cannot be simulated there.
+        """
+        problem, entries = self.problem, self.problem.entries(terms)
         known = {
             entry.identity: (value, i)
             for i, (entry, value) in enumerate(zip(base.entries, base.x.tolist(), strict=True))
         }
-        new = [i for i, entry in enumerate(entries) if entry.identity not in known]
+        fresh = [i for i, entry in enumerate(entries) if entry.identity not in known]
+        old = [i for i, entry in enumerate(entries) if entry.identity in known]
         x = np.array(
-            [
-                known[entry.identity][0] if entry.identity in known else _begin(entry, term)
-                for entry in entries
-            ]
+            [known[entry.identity][0] if entry.identity in known else _begin(entry, new) for entry in entries]
         )
         found, valid = problem.residuals(terms, entries, [x])
         if not valid[0]:
-            return
-        own = problem.jacobian(terms, entries, x, new) if new else {}
+            return None
+        own = self._columns_of(terms, entries, x, fresh, new) if fresh else {}
         J = {}
-        for name, old in base.J.items():
-            whole = np.empty((old.shape[0], len(entries)))
-            places = [known[entry.identity][1] for entry in entries if entry.identity in known]
-            whole[:, [i for i in range(len(entries)) if i not in set(new)]] = old[:, places]
-            if new:
-                whole[:, new] = own[name]
-            J[name] = whole
-        yield Linear(terms, entries, x, {name: e[:, 0] for name, e in found.items()}, J, base.levels)
+        for name, before in base.J.items():
+            J[name] = np.empty((before.shape[0], len(entries)))
+            J[name][:, old] = before[:, [known[entries[i].identity][1] for i in old]]
+            if fresh:
+                J[name][:, fresh] = own[name]
+        return Linear(terms, entries, x, {name: e[:, 0] for name, e in found.items()}, J, base.levels)
 
 
-def _begin(entry: Entry, term: Term) -> float:
+def _begin(entry: Entry, term: Term | None) -> float:
     """Return where the search for a new number begins."""
-    away = term.size * entry.sd if entry.kind in ("cause", "delay") else 0.0
+    away = term.size * entry.sd if term and entry.kind in ("cause", "delay") else 0.0
     return float(np.clip(entry.centre + away, entry.low, entry.high))
