@@ -5,7 +5,9 @@ By the engine for any model, given as the tethered vehicle (`subzero2`):
     bolt     measured logs of another vehicle, imported as a user does    FOLDER/bolt_auv/*.csv
     remus    a REMUS 100 by another simulator, with noise                 FOLDER/pvs_remus100_reference/*.csv
     numbers  `subzero2` with 3 % (one standard deviation) on every number of the vehicle, the cable and the drum, by the
-             other formulation of the cable, manoeuvres and noise of the world
+             other formulation of the cable, manoeuvres and noise of the world; in trim, as the nominal vehicle is: the
+             centre of buoyancy remains above the centre of gravity (3 % of either's place alone, measured from the
+             middle of the hull, would be three tolerances of `cg_offset`, a cause that is rightly named)
 
 Each name of a cause or of an error in the data is an invention.
 """
@@ -123,8 +125,10 @@ def _off(model: Model, rng: np.random.Generator) -> dict[str, Any]:
         {name: value for name, value in model.parameters()[part].items() if name != "water_density"}
         for part in ("cable", "drum")
     )
+    vehicle = off(to_mapping(model.vehicle))
+    vehicle["buoyancy"]["centre_of_buoyancy_x"] = vehicle["rigid_body"]["centre_of_gravity_x"]
     return {
-        "vehicle": from_mapping(off(to_mapping(model.vehicle))),
+        "vehicle": from_mapping(vehicle),
         "cable": CableProperties(water_density=model.cable.water_density, **off(cable)),
         "drum": DrumProperties(**off(drum)),
     }

@@ -1,8 +1,8 @@
 """The search for explanations: ranked in the linear problem, the best fitted with simulations; add, drop, swap.
 
 It begins twice: at the nominal model, where gross errors in the data are plain whatever a fit would bend, and at the
-fit of "nothing is wrong". Without a gross error a fit bends the model to the wrong readings: what may stand in its place
-is judged where the fit with it ends.
+fit of "nothing is wrong". Without a gross error a fit bends the model to the wrong readings: what may stand in its
+place is judged where the fit with it ends.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from subzero.identification.candidates import OFF_LEVELS, declared, suggested
-from subzero.identification.explanation import Entry, Term, Terms, log_prior, with_term, without
+from subzero.identification.explanation import AFFINE, Entry, Term, Terms, log_prior, with_term, without
 from subzero.identification.fit import (
     Fit,
     Linear,
@@ -56,6 +56,11 @@ def key(terms: Terms) -> Key:
     )
 
 
+def ids(terms: Terms) -> tuple[str, ...]:
+    """Return what an explanation is, whatever the known units of its channels are."""
+    return tuple(term.id for term in terms)
+
+
 @dataclass(eq=False)
 class Search:
     """A search.
@@ -73,7 +78,7 @@ class Search:
     complete: bool = True
 
     def __post_init__(self) -> None:
-        self._expanded: set[Key] = set()
+        self._expanded: dict[tuple[str, ...], float] = {}
         self._tried: set[Key] = set()
         self._added: dict[int, tuple[Linear, list[tuple[float, Linear]]]] = {}
         self._columns: dict[
@@ -109,14 +114,16 @@ class Search:
 
     def _next(self) -> Fit | None:
         """Return the best explanation that was not expanded yet, if it is near the best of all, and no part of it is
-        better: what a term more did not gain, two will not.
+        better: what a term more did not gain, two will not. Nor if it is like one that was, with another known unit of
+        a channel, and not much better.
         """
         ranked = self.ranked()
         best = self.score(ranked[0])
         for i, each in enumerate(ranked):
             own = set(key(each.terms))
             simpler = any(set(key(other.terms)) < own for other in ranked[:i])
-            if self.score(each) > best - WITHIN and not simpler and key(each.terms) not in self._expanded:
+            like = self._expanded.get(ids(each.terms), -np.inf)
+            if self.score(each) > max(best - WITHIN, like + WITHIN) and not simpler:
                 return each
         return None
 
@@ -124,11 +131,14 @@ class Search:
         """Fit the best explanations that are one move away: gross errors in the data first, as all else depends on
         them.
         """
-        best = self.ranked()[0]
-        gross = [term for term in base.terms if self._fit_replacements(base, term)]
-        if self.ranked()[0] is not best:
+        better, gross = base, []
+        for term in base.terms:
+            if self._is_gross(base, term):
+                gross.append(term)
+                better = max([better, *self._replacements(better, term)], key=self.score)
+        if better is not base:
             return
-        self._expanded.add(key(base.terms))
+        self._expanded[ids(base.terms)] = self.score(base)
         self._fit_additions(base.linear)
         for term in base.terms:
             if term not in gross:
@@ -138,19 +148,30 @@ class Search:
                 if linear and self._own_score(linear) > self.score(base) - GROSS:
                     self._fit(linear.terms, base.linear)
 
-    def _fit_replacements(self, base: Fit, term: Term) -> bool:
-        """Fit the best explanations with another error of the same channel in the place of a gross one, from the point
-        where the fit with that ends, and return whether it is one.
-        """
-        bare = self.there(base.linear, without(base.terms, term)) if term.is_data_error else None
-        if bare is None or self._own_score(bare) > self.score(base) - GROSS:
+    def _is_gross(self, base: Fit, term: Term) -> bool:
+        """Return whether a term is an error in the data without which the linear problem is far less probable."""
+        if not term.is_data_error:
             return False
-        others = [each for each in self._terms if each.is_data_error and each.target == term.target]
-        found = [self._with_own_noise(linear) for _, linear in self._additions(bare, others)]
-        for score, linear in self._distinct(sorted(found, key=lambda pair: -pair[0]))[:REPLACED]:
-            if score > self.score(base) - GROSS:
-                self._fit(linear.terms, linear, score)
-        return True
+        bare = self.there(base.linear, without(base.terms, term))
+        return bare is not None and self._own_score(bare) < self.score(base) - GROSS
+
+    def _replacements(self, base: Fit, term: Term) -> list[Fit]:
+        """Return the fits of the best explanations with another unit, or a regression, of a channel in the place of a
+        gross error, from the point where the fit with that ends.
+        """
+        bare = self.there(base.linear, without(base.terms, term))
+        if bare is None or term.slot[0] != AFFINE:
+            return []
+        units = [each for each in self._terms if each.kind == "unit" and each.target == term.target]
+        other = [each for each in suggested(self.problem, bare, units) if each.kind == "affine"]
+        made = [self.there(bare, with_term(bare.terms, each)) for each in (*units, *other)]
+        found = [self._with_own_noise(linear) for linear in made if linear]
+        ranked = self._distinct(sorted(found, key=lambda pair: -pair[0]))[:REPLACED]
+        return [
+            self._fit(linear.terms, linear, score)
+            for score, linear in ranked
+            if score > self.score(base) - GROSS
+        ]
 
     def _fit_additions(self, base: Linear) -> None:
         """Fit the best explanations with one term more, except those that are ranked far below the best of all fits.
@@ -267,8 +288,8 @@ class Search:
     def _columns_of(
         self, terms: Terms, entries: list[Entry], x: np.ndarray, fresh: list[int], new: Term | None
     ) -> dict[str, np.ndarray]:
-        """Return the columns of fresh entries at x; those of a cause that begins switched off are kept while the rest of
-        the model has hardly moved.
+        """Return the columns of fresh entries at x; those of a cause that begins switched off are kept while the rest
+        of the model has hardly moved.
         """
         off = new is not None and new.kind == "cause" and not new.size
         if new is None or not off:
