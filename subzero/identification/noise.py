@@ -134,8 +134,7 @@ class Filter:
     def whiten(self, columns: np.ndarray) -> np.ndarray:
         """Return the innovations of columns (m, k), of level 1."""
         white = np.empty_like(columns)
-        expected = np.zeros(columns.shape[1])
-        innovations(self.decay, self.gain, self.scale, np.ascontiguousarray(columns), expected, white)
+        innovations(self.decay, self.gain, self.scale, np.ascontiguousarray(columns), white)
         return white
 
 
@@ -153,17 +152,10 @@ def gains(decay: np.ndarray, white: float, slow: float, gain: np.ndarray, scale:
 
 @compiled
 def innovations(
-    decay: np.ndarray,
-    gain: np.ndarray,
-    scale: np.ndarray,
-    values: np.ndarray,
-    expected: np.ndarray,
-    white: np.ndarray,
+    decay: np.ndarray, gain: np.ndarray, scale: np.ndarray, values: np.ndarray, white: np.ndarray
 ) -> None:
-    """Fill the innovations of columns (m, k): each value less its prediction, over its standard deviation.
-
-    The predictions (k,) begin at 0, and are overwritten.
-    """
+    """Fill the innovations of columns (m, k): each value less its prediction, over its standard deviation."""
+    expected = np.zeros(values.shape[1])
     for i in range(values.shape[0]):
         for j in range(values.shape[1]):
             new = values[i, j] - expected[j]
