@@ -155,12 +155,12 @@ def innovations(
     decay: np.ndarray, gain: np.ndarray, scale: np.ndarray, values: np.ndarray, white: np.ndarray
 ) -> None:
     """Fill the innovations of columns (m, k): each value less its prediction, over its standard deviation."""
-    expected = np.zeros(values.shape[1])
     for i in range(values.shape[0]):
+        before = max(i - 1, 0)
+        passed, left = (decay[before], (1.0 - gain[before]) * scale[before]) if i else (0.0, 0.0)
         for j in range(values.shape[1]):
-            new = values[i, j] - expected[j]
-            white[i, j] = new / scale[i]
-            expected[j] = decay[i] * (expected[j] + gain[i] * new)
+            expected = passed * (values[before, j] - left * white[before, j]) if i else 0.0
+            white[i, j] = (values[i, j] - expected) / scale[i]
 
 
 def log_marginal(given: Filter, columns: np.ndarray) -> float:
