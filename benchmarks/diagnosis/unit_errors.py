@@ -29,8 +29,9 @@ FACTORS = {
     "surge_speed": (3.6 / 1.852, 3.6, 1.0 / 0.3048),
 }
 """Factors of wrong units by channel, and of slips of any channel but the compass."""
-SAME, SURE = 0.05, 0.95
-"""A factor is right within this share; a wrong name from this probability on counts. [-]"""
+SAME, SAID, SURE = 0.05, 3.0, 0.95
+"""A factor is right within this share, or so many standard deviations that the verdict gives; a wrong name from this
+probability on counts. [-]"""
 app = cyclopts.App(
     name="python -m benchmarks.diagnosis.unit_errors", help_format="plaintext", version_flags=[]
 )
@@ -49,8 +50,12 @@ def planted(seed: int, index: int) -> tuple[dict[str, float], list[tuple[str, fl
     said, wrong, right = [], False, set()
     for each in verdict.named:
         name = each.id.partition(":")[2].partition("@")[0]
-        factor = math.prod(e.value for e in each.estimates if e.name == "factor")
-        fits = each.is_data_error and abs(factor / factors.get(name, math.inf) - 1.0) < SAME
+        true = factors.get(name, math.inf)
+        fits = each.is_data_error and any(
+            abs(e.value - true) < max(SAME * abs(true), SAID * e.sd)
+            for e in each.estimates
+            if e.name == "factor"
+        )
         right |= {name} if fits else set()
         wrong |= not fits and each.probability > SURE
         said.append((each.id, each.probability))

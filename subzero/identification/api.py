@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 
 from subzero.arguments import checked_arguments
 from subzero.identification.candidates import declared
-from subzero.identification.explanation import Entry, Term, Terms, kinds_of, with_term
+from subzero.identification.explanation import AFFINE, Entry, Term, Terms, kinds_of, with_term
 from subzero.identification.fit import Fit, free_fit
 from subzero.identification.locks import Locks, locks
 from subzero.identification.model import Model
@@ -176,9 +176,9 @@ def _estimates(problem: Problem, best: Fit, term: Term) -> tuple[Estimate, ...]:
 
 
 def _of_data_error(term: Term, entry: Entry, value: float, sd: float) -> list[Estimate]:
-    if entry.kind == "gain" and term.slot[0] == "y = a + b x":
+    if entry.kind == "gain" and term.slot[0] == AFFINE:
         return [Estimate("factor", term.factor * (1.0 + value), abs(term.factor) * sd, 1.0)]
-    if entry.kind == "offset" and term.slot[0] == "y = a + b x":
+    if entry.kind == "offset" and term.slot[0] == AFFINE:
         return [Estimate("offset", term.offset + term.factor * value, abs(term.factor) * sd, 0.0)]
     return [Estimate(entry.kind, value, sd, 0.0)]
 
@@ -239,9 +239,7 @@ def _contrast(
     for each in ranked:
         mean = variance = 0.0
         for channel, sign in ((b, 1.0), (a, -1.0)):
-            factor = [
-                term.factor for term in each.terms if term.target == channel and term.slot[0] == "y = a + b x"
-            ]
+            factor = [term.factor for term in each.terms if term.target == channel and term.slot[0] == AFFINE]
             mean += sign * sum(math.log(abs(f)) for f in factor) if kind == "gain" else 0.0
             for entry, value, own in zip(each.entries, each.x.tolist(), each.variance.tolist(), strict=True):
                 if entry.kind == kind and entry.name == channel:
@@ -324,7 +322,7 @@ def _visible_from(search: Search) -> dict[str, str]:
     for term in declared(search.problem):
         if term.kind not in ("scale", "offset", "delay", "cause") or math.isfinite(term.begins) or term.size:
             continue
-        for linear in search.added(base, term):
+        if (linear := search.there(base, with_term(base.terms, term), term)) is not None:
             for name, size, unit in _sizes(search.problem, linear, term):
                 found.setdefault(name, f"{size:.2g}{unit}")
     return found

@@ -21,6 +21,8 @@ from subzero.identification.model import Cause, Model
 
 CLOCK = "clock"
 """Target of an error of the clock of all channels together."""
+AFFINE = "y = a + b x"
+"""Of such errors an explanation has only one for each channel."""
 WIDER = 4.0
 """How much wider the tolerances of a calibration are. [-]"""
 TUNED_WIDER = 10.0
@@ -136,7 +138,7 @@ class Term:
     def slot(self) -> tuple[str, str]:
         """What an explanation can have only one of: a channel's y = a + b x, one cause."""
         affine = ("offset", "scale", "affine", "unit")
-        return ("y = a + b x" if self.kind in affine else self.kind, self.target)
+        return (AFFINE if self.kind in affine else self.kind, self.target)
 
 
 Terms = tuple[Term, ...]

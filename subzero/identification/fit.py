@@ -234,14 +234,13 @@ def bounds(entries: Sequence[Entry]) -> tuple[np.ndarray, np.ndarray]:
     return np.array([entry.low for entry in entries]), np.array([entry.high for entry in entries])
 
 
-def fitted_levels(problem: Problem, linear: Linear, sweeps: int = 2) -> Levels:
+def fitted_levels(problem: Problem, linear: Linear) -> Levels:
     """Return the noise and the sizes that have the highest evidence in a linear problem, one after the other."""
     products, levels = Products(problem, linear.terms, linear.e, linear.J), linear.levels
-    for _ in range(sweeps):
-        for unknown in problem.model.unknown:
-            levels = _best_size(problem, linear, products, levels, unknown.name)
-        for name in linear.e:
-            levels = _best_noise(problem, linear, products, levels, name)
+    for unknown in problem.model.unknown:
+        levels = _best_size(problem, linear, products, levels, unknown.name)
+    for name in linear.e:
+        levels = _best_noise(problem, linear, products, levels, name)
     return levels
 
 
@@ -263,7 +262,6 @@ def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Le
     """Return levels with the noise of a channel that has the highest evidence, given those of all others."""
     before, prior = levels.noise[name], problem.channels[name].prior
     times, columns = given_others(problem, linear, products, levels, name)
-    work = np.empty((columns.shape[1], columns.shape[1])), np.empty((2, columns.shape[1]))
 
     def at(log: np.ndarray) -> Noise:
         white, slow, time = (np.array([before.white, before.slow, before.time]) * np.exp(log)).tolist()
@@ -274,8 +272,7 @@ def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Le
         density = prior.log_density(noise)
         if not np.isfinite(density):
             return 1e300
-        given = Filter.of(noise, prior.resolution, times)
-        return -log_marginal(given.decay, given.gain, given.scale, columns, *work) - density
+        return -log_marginal(Filter.of(noise, prior.resolution, times), columns) - density
 
     lasting = np.log(
         np.array([before.time, *(share * prior.interval for share in TIMES_TRIED)]) / before.time
@@ -283,7 +280,7 @@ def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Le
     begin = np.column_stack([np.zeros((lasting.size, 2)), lasting])
     best = begin[int(np.argmin([negative(each) for each in begin]))]
     simplex = best + np.vstack([np.zeros(3), np.diag([0.3, -0.5, 0.7])])
-    options = {"initial_simplex": simplex, "maxfev": 60, "xatol": 0.02, "fatol": ENOUGH}
+    options = {"initial_simplex": simplex, "maxfev": 60, "xatol": 0.2, "fatol": ENOUGH}
     found = minimize(negative, best, method="Nelder-Mead", options=options)
     better = found.fun <= negative(np.zeros(3))
     return replace(levels, noise={**levels.noise, name: at(found.x)}) if better else levels
@@ -392,12 +389,14 @@ def _is_linear(problem: Problem, origin: Linear, there: Linear) -> bool:
     """Return whether sensitivities of one point still hold at another: what they miss of the change of the residuals is
     little, or a small share of it.
     """
-    moved, missed = 0.0, 0.0
+    moved = missed = 0.0
     for name, e in there.e.items():
-        used, level = problem.used(name, there.terms), there.levels.noise[name].white
         change = origin.J[name] @ (there.x - origin.x)
-        moved += float(np.sum((change[used] / level) ** 2))
-        missed += float(np.sum(((origin.e[name] - change - e)[used] / level) ** 2))
+        left = origin.e[name] - change - e
+        for _, times, both in _blocks(problem, name, there.terms, change[:, None], left):
+            filtered = Filter.of(there.levels.noise[name], problem.channels[name].prior.resolution, times)
+            squares = np.sum(filtered.whiten(both) ** 2, axis=0)
+            moved, missed = moved + float(np.sum(squares[:-1])), missed + float(squares[-1])
     return missed < max(2.0 * ENOUGH, SLOPE_ERROR**2 * moved)
 
 

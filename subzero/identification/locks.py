@@ -68,13 +68,22 @@ class Locks:
 
 def locks(problem: Problem, best: Fit, held_out: Sequence[Record]) -> dict[str, Locks]:
     """Return the locks of every term of the best explanation: id → locks."""
+    having: dict[str, list[np.ndarray]] = {}
     return {
-        term.id: _locks(problem, best, term, held_out) for term in best.terms if term.kind != "tolerances"
+        term.id: _locks(problem, best, term, held_out, having)
+        for term in best.terms
+        if term.kind != "tolerances"
     }
 
 
-def _locks(problem: Problem, best: Fit, term: Term, held_out: Sequence[Record]) -> Locks:
-    gain = held_out_gain(problem, best, term, held_out)
+def _locks(
+    problem: Problem,
+    best: Fit,
+    term: Term,
+    held_out: Sequence[Record],
+    having: dict[str, list[np.ndarray]],
+) -> Locks:
+    gain = held_out_gain(problem, best, term, held_out, having)
     reasons = [f"{name} may as well act late or early" for name in _late_commands(problem, term)]
     if gain is not None and not gain.holds:
         reasons.append(
@@ -92,10 +101,17 @@ def _late_commands(problem: Problem, term: Term) -> list[str]:
     return [name.removeprefix(COMMAND) for name in names if name.startswith(COMMAND)]
 
 
-def held_out_gain(problem: Problem, best: Fit, term: Term, held_out: Sequence[Record]) -> Gain | None:
+def held_out_gain(
+    problem: Problem,
+    best: Fit,
+    term: Term,
+    held_out: Sequence[Record],
+    having: dict[str, list[np.ndarray]],
+) -> Gain | None:
     """Return the gain of a term in free simulation of what was not fitted; None if that cannot be tried.
 
     Of several records each is predicted by a fit of the others; of a single one the last part by a fit of the first.
+    What is predicted with all terms is kept in `having`.
     """
     if held_out:
         folds = [(list(problem.records), list(held_out), -math.inf)]
@@ -117,9 +133,10 @@ def held_out_gain(problem: Problem, best: Fit, term: Term, held_out: Sequence[Re
             return None
         folds = [([record.between(-math.inf, split)], [record], split)]
         what = "the last part of the record by a fit of the first"
-    having = _predicted(problem, best, best.terms, folds)
+    if what not in having:
+        having[what] = _predicted(problem, best, best.terms, folds)
     lacking = _predicted(problem, best, without(best.terms, term), folds)
-    return _gain(having, lacking, what, strict=bool(held_out))
+    return _gain(having[what], lacking, what, strict=bool(held_out))
 
 
 Fold = tuple[Sequence[Record], Sequence[Record], float]

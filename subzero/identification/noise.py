@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import blas, lapack
 
 from subzero.jit import compiled
 
@@ -154,52 +155,22 @@ def innovations(
     decay: np.ndarray, gain: np.ndarray, scale: np.ndarray, values: np.ndarray, white: np.ndarray
 ) -> None:
     """Fill the innovations of columns (m, k): each value less its prediction, over its standard deviation."""
-    for j in range(values.shape[1]):
-        expected = 0.0
-        for i in range(values.shape[0]):
-            new = values[i, j] - expected
-            white[i, j] = new / scale[i]
-            expected = decay[i] * (expected + gain[i] * new)
+    for i in range(values.shape[0]):
+        before = max(i - 1, 0)
+        passed, left = (decay[before], (1.0 - gain[before]) * scale[before]) if i else (0.0, 0.0)
+        for j in range(values.shape[1]):
+            expected = passed * (values[before, j] - left * white[before, j]) if i else 0.0
+            white[i, j] = (values[i, j] - expected) / scale[i]
 
 
-@compiled
-def log_marginal(
-    decay: np.ndarray,
-    gain: np.ndarray,
-    scale: np.ndarray,
-    columns: np.ndarray,
-    G: np.ndarray,
-    row: np.ndarray,
-) -> float:
+def log_marginal(given: Filter, columns: np.ndarray) -> float:
     """Return the log density of residuals e₀ − K w with w ~ N(0, I), up to a constant, from columns [K e₀] (m, r + 1).
 
     log p = −½ (e₀ᵀΣ⁻¹e₀ − bᵀH⁻¹b) − ½ log|H| − ½ log|Σ|,   H = I + KᵀΣ⁻¹K,   b = KᵀΣ⁻¹e₀
-
-    G (r + 1, r + 1) and row (2, r + 1) are overwritten.
     """
-    count, total = columns.shape[1], 0.0
-    expected, white = row[0], row[1]
-    for j in range(count):
-        expected[j] = 0.0
-        for k in range(count):
-            G[j, k] = 1.0 if j == k and j < count - 1 else 0.0
-    for i in range(columns.shape[0]):
-        for j in range(count):
-            new = columns[i, j] - expected[j]
-            white[j] = new / scale[i]
-            expected[j] = decay[i] * (expected[j] + gain[i] * new)
-        for j in range(count):
-            for k in range(j + 1):
-                G[j, k] += white[j] * white[k]
-        total -= np.log(scale[i])
+    G = blas.dsyrk(1.0, given.whiten(columns).T, lower=1)
+    count = G.shape[0] - 1
+    G[np.arange(count), np.arange(count)] += 1.0
     # The last row of the Cholesky factor of [H b; bᵀ e₀ᵀΣ⁻¹e₀] leaves the square that w does not explain.
-    for j in range(count):
-        for k in range(j):
-            for i in range(k):
-                G[j, k] -= G[j, i] * G[k, i]
-            G[j, k] /= G[k, k]
-            G[j, j] -= G[j, k] * G[j, k]
-        if j < count - 1:
-            G[j, j] = np.sqrt(G[j, j])
-            total -= np.log(G[j, j])
-    return total - 0.5 * G[-1, -1]
+    diagonal = np.diag(lapack.dpotrf(G, lower=1, overwrite_a=1)[0])
+    return -given.log_scale - float(np.sum(np.log(diagonal[:-1]))) - 0.5 * float(diagonal[-1]) ** 2

@@ -1,7 +1,8 @@
 """The search for explanations: ranked in the linear problem, the best fitted with simulations; add, drop, swap.
 
 It begins twice: at the nominal model, where gross errors in the data are plain whatever a fit would bend, and at the
-fit of "nothing is wrong".
+fit of "nothing is wrong". Without a gross error a fit bends the model to the wrong readings: what may stand in its
+place is judged where the fit with it ends.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from subzero.identification.candidates import OFF_LEVELS, declared, suggested
-from subzero.identification.explanation import Entry, Term, Terms, log_prior, with_term, without
+from subzero.identification.explanation import AFFINE, Entry, Term, Terms, log_prior, with_term, without
 from subzero.identification.fit import (
     Fit,
     Linear,
@@ -28,12 +29,15 @@ from subzero.identification.problem import Problem, Progress
 
 MOST_TERMS = 8
 """An explanation has no more terms."""
-RANKED_AGAIN, FITTED = 10, 6
-"""So many of the best are ranked again with their own noise; at most so many of these are fitted."""
+RANKED_AGAIN, FITTED, REPLACED = 10, 6, 3
+"""So many of the best are ranked again with their own noise; at most so many of these are fitted; and of errors of one
+channel in the place of a gross one."""
 WITHIN = 5.0
 """Explanations within this of the best are expanded, too. [nats]"""
-WORTH, STEP_WORTH = 3.0, 1.0
-"""A term that is ranked to lose more is not fitted; one that gains less ends the way from the nominal model. [nats]"""
+WORTH, GROSS = 3.0, 100.0
+"""A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one. [nats]"""
+SAME_POINT = 0.3
+"""Columns of a cause serve while no number of the model moves by more, in standard deviations of its prior. [-]"""
 OF_MODEL = ("number", "start", "unknown")
 """Kinds of entries that every explanation has."""
 TWINS = ("offset", "scale", "affine", "delay")
@@ -50,6 +54,11 @@ def key(terms: Terms) -> Key:
         (term.id, term.factor if term.kind == "unit" else 1.0, term.offset if term.kind == "unit" else 0.0)
         for term in terms
     )
+
+
+def ids(terms: Terms) -> tuple[str, ...]:
+    """Return what an explanation is, whatever the known units of its channels are."""
+    return tuple(term.id for term in terms)
 
 
 @dataclass(eq=False)
@@ -69,9 +78,12 @@ class Search:
     complete: bool = True
 
     def __post_init__(self) -> None:
-        self._expanded: set[Key] = set()
+        self._expanded: dict[tuple[str, ...], float] = {}
         self._tried: set[Key] = set()
         self._added: dict[int, tuple[Linear, list[tuple[float, Linear]]]] = {}
+        self._columns: dict[
+            tuple[str, float], tuple[dict[tuple[str, str, int, int], float], dict[str, np.ndarray]]
+        ] = {}
         self._terms = declared(self.problem)
         self._loggers = {name: sensor.logger for name, sensor in self.problem.model.channels.items()}
 
@@ -92,7 +104,7 @@ class Search:
         )
         chain = self._greedy(nominal) if unexplained(problem, nominal) > OFF_LEVELS else []
         self._fit((), nominal)
-        for linear in chain:
+        for linear in chain[-1:]:
             self._fit(linear.terms, linear)
         while (base := self._next()) is not None:
             if len(self.fits) >= MOST_FITS:
@@ -102,26 +114,64 @@ class Search:
 
     def _next(self) -> Fit | None:
         """Return the best explanation that was not expanded yet, if it is near the best of all, and no part of it is
-        better: what a term more did not gain, two will not.
+        better: what a term more did not gain, two will not. Nor if it is like one that was, with another known unit of
+        a channel, and not much better.
         """
         ranked = self.ranked()
         best = self.score(ranked[0])
         for i, each in enumerate(ranked):
             own = set(key(each.terms))
             simpler = any(set(key(other.terms)) < own for other in ranked[:i])
-            if self.score(each) > best - WITHIN and not simpler and key(each.terms) not in self._expanded:
+            like = self._expanded.get(ids(each.terms), -np.inf)
+            if self.score(each) > max(best - WITHIN, like + WITHIN) and not simpler:
                 return each
         return None
 
     def _expand(self, base: Fit) -> None:
-        """Fit the best explanations that are one move away."""
-        self._expanded.add(key(base.terms))
+        """Fit the best explanations that are one move away: gross errors in the data first, as all else depends on
+        them.
+        """
+        better, gross = base, []
+        for term in base.terms:
+            if self._is_gross(base, term):
+                gross.append(term)
+                better = max([better, *self._replacements(better, term)], key=self.score)
+        if better is not base:
+            return
+        self._expanded[ids(base.terms)] = self.score(base)
         self._fit_additions(base.linear)
         for term in base.terms:
-            smaller = self._fit(without(base.terms, term), base.linear)
-            self._fit_additions(smaller.linear)
+            if term not in gross:
+                self._fit_additions(self._fit(without(base.terms, term), base.linear).linear)
             for twin in self._twins(term):
-                self._fit(with_term(smaller.terms, twin), base.linear)
+                linear = self.there(base.linear, with_term(without(base.terms, term), twin))
+                if linear and self._own_score(linear) > self.score(base) - GROSS:
+                    self._fit(linear.terms, base.linear)
+
+    def _is_gross(self, base: Fit, term: Term) -> bool:
+        """Return whether a term is an error in the data without which the linear problem is far less probable."""
+        if not term.is_data_error:
+            return False
+        bare = self.there(base.linear, without(base.terms, term))
+        return bare is not None and self._own_score(bare) < self.score(base) - GROSS
+
+    def _replacements(self, base: Fit, term: Term) -> list[Fit]:
+        """Return the fits of the best explanations with another unit, or a regression, of a channel in the place of a
+        gross error, from the point where the fit with that ends.
+        """
+        bare = self.there(base.linear, without(base.terms, term))
+        if bare is None or term.slot[0] != AFFINE:
+            return []
+        units = [each for each in self._terms if each.kind == "unit" and each.target == term.target]
+        other = [each for each in suggested(self.problem, bare, units) if each.kind == "affine"]
+        made = [self.there(bare, with_term(bare.terms, each)) for each in (*units, *other)]
+        found = [self._with_own_noise(linear) for linear in made if linear]
+        ranked = self._distinct(sorted(found, key=lambda pair: -pair[0]))[:REPLACED]
+        return [
+            self._fit(linear.terms, linear, score)
+            for score, linear in ranked
+            if score > self.score(base) - GROSS
+        ]
 
     def _fit_additions(self, base: Linear) -> None:
         """Fit the best explanations with one term more, except those that are ranked far below the best of all fits.
@@ -130,7 +180,7 @@ class Search:
         """
         here = self._linear_score(base)
         for score, linear in self._best_additions(base)[:FITTED]:
-            if score > max(here, self.score(self.ranked()[0]) - WITHIN) - WORTH:
+            if score > max(here - WORTH, self.score(self.ranked()[0]) - WITHIN):
                 self._fit(linear.terms, linear, score)
 
     def _twins(self, term: Term) -> Iterator[Term]:
@@ -173,12 +223,15 @@ class Search:
         return self.fits[name]
 
     def _greedy(self, nominal: Linear) -> list[Linear]:
-        """Return explanations, each with the term more that gains most in the linear problem at the nominal model."""
+        """Return explanations, each with the gross error in the data more that gains most in the linear problem at the
+        nominal model.
+        """
         chain: list[Linear] = []
         here, before = nominal, self._linear_score(nominal)
+        errors = [term for term in self._terms if term.is_data_error]
         while len(here.terms) < MOST_TERMS:
-            added = self._additions(here)
-            if not added or added[0][0] < before + STEP_WORTH:
+            added = self._additions(here, errors)
+            if not added or added[0][0] < before + GROSS:
                 break
             before, here = added[0]
             chain.append(here)
@@ -191,11 +244,15 @@ class Search:
         """Return explanations with one term more with their scores, ranked with their own noise."""
         if len(base.terms) >= MOST_TERMS:
             return []
-        again = []
-        for linear in self._worth_own_noise(self._additions(base)):
-            own = replace(linear, levels=fitted_levels(self.problem, linear, sweeps=1))
-            again.append((self._linear_score(own), own))
-        return self._distinct(sorted(again, key=lambda pair: -pair[0]))
+        if id(base) in self._added:
+            return self._added[id(base)][1]
+        again = [
+            self._with_own_noise(linear)
+            for linear in self._worth_own_noise(self._additions(base, self._terms))
+        ]
+        found = self._distinct(sorted(again, key=lambda pair: -pair[0]))
+        self._added[id(base)] = (base, found)  # kept with its base, so that no other can take its identity
+        return found
 
     def _worth_own_noise(self, ranked: list[tuple[float, Linear]]) -> Iterator[Linear]:
         """Yield the best, ranked with the noise of the explanation that they are added to, and ranked with usual noise,
@@ -212,48 +269,69 @@ class Search:
             found.setdefault(key(linear.terms), (score, linear))
         return list(found.values())
 
-    def _additions(self, base: Linear) -> list[tuple[float, Linear]]:
-        """Return explanations with one term more, linearised, with their scores: the best first."""
-        if id(base) in self._added:
-            return self._added[id(base)][1]
-        present = {term.id for term in base.terms}
-        worth = [term for term in suggested(self.problem, base, self._terms) if term.id not in present]
-        found = [(self._linear_score(linear), linear) for term in worth for linear in self.added(base, term)]
-        found.sort(key=lambda pair: -pair[0])
-        self._added[id(base)] = (base, found)  # kept with its base, so that no other can take its identity
-        return found
+    def _with_own_noise(self, linear: Linear) -> tuple[float, Linear]:
+        """Return an explanation with the noise of its own residuals, and its score."""
+        own = replace(linear, levels=fitted_levels(self.problem, linear))
+        return self._linear_score(own), own
 
-    def added(self, base: Linear, term: Term) -> Iterator[Linear]:
-        """Yield an explanation with a term more, if it can be simulated where the term begins."""
-        problem, terms = self.problem, with_term(base.terms, term)
-        entries = problem.entries(terms)
+    def _own_score(self, linear: Linear) -> float:
+        return self._with_own_noise(linear)[0]
+
+    def _additions(self, base: Linear, terms: list[Term]) -> list[tuple[float, Linear]]:
+        """Return explanations with one of some terms more, linearised, with their scores: the best first."""
+        present = {term.id for term in base.terms}
+        worth = [term for term in suggested(self.problem, base, terms) if term.id not in present]
+        there = [self.there(base, with_term(base.terms, term), term) for term in worth]
+        found = [(self._linear_score(linear), linear) for linear in there if linear]
+        return sorted(found, key=lambda pair: -pair[0])
+
+    def _columns_of(
+        self, terms: Terms, entries: list[Entry], x: np.ndarray, fresh: list[int], new: Term | None
+    ) -> dict[str, np.ndarray]:
+        """Return the columns of fresh entries at x; those of a cause that begins switched off are kept while the rest
+        of the model has hardly moved.
+        """
+        off = new is not None and new.kind == "cause" and not new.size
+        if new is None or not off:
+            return self.problem.jacobian(terms, entries, x, fresh)
+        rest = [(entry.identity, value / entry.sd) for entry, value in zip(entries, x.tolist(), strict=True)
+                if entry.kind in OF_MODEL]  # fmt: skip
+        here, name = dict(rest), (new.id, new.begins)
+        if name in self._columns:
+            there, columns = self._columns[name]
+            if there.keys() == here.keys() and max(abs(here[k] - there[k]) for k in here) < SAME_POINT:
+                return columns
+        self._columns[name] = (here, self.problem.jacobian(terms, entries, x, fresh))
+        return self._columns[name][1]
+
+    def there(self, base: Linear, terms: Terms, new: Term | None = None) -> Linear | None:
+        """Return another explanation, linearised at the point of a base, its new term where that begins; None if it
+        cannot be simulated there.
+        """
+        problem, entries = self.problem, self.problem.entries(terms)
         known = {
             entry.identity: (value, i)
             for i, (entry, value) in enumerate(zip(base.entries, base.x.tolist(), strict=True))
         }
-        new = [i for i, entry in enumerate(entries) if entry.identity not in known]
+        fresh = [i for i, entry in enumerate(entries) if entry.identity not in known]
+        old = [i for i, entry in enumerate(entries) if entry.identity in known]
         x = np.array(
-            [
-                known[entry.identity][0] if entry.identity in known else _begin(entry, term)
-                for entry in entries
-            ]
+            [known[entry.identity][0] if entry.identity in known else _begin(entry, new) for entry in entries]
         )
         found, valid = problem.residuals(terms, entries, [x])
         if not valid[0]:
-            return
-        own = problem.jacobian(terms, entries, x, new) if new else {}
+            return None
+        own = self._columns_of(terms, entries, x, fresh, new) if fresh else {}
         J = {}
-        for name, old in base.J.items():
-            whole = np.empty((old.shape[0], len(entries)))
-            places = [known[entry.identity][1] for entry in entries if entry.identity in known]
-            whole[:, [i for i in range(len(entries)) if i not in set(new)]] = old[:, places]
-            if new:
-                whole[:, new] = own[name]
-            J[name] = whole
-        yield Linear(terms, entries, x, {name: e[:, 0] for name, e in found.items()}, J, base.levels)
+        for name, before in base.J.items():
+            J[name] = np.empty((before.shape[0], len(entries)))
+            J[name][:, old] = before[:, [known[entries[i].identity][1] for i in old]]
+            if fresh:
+                J[name][:, fresh] = own[name]
+        return Linear(terms, entries, x, {name: e[:, 0] for name, e in found.items()}, J, base.levels)
 
 
-def _begin(entry: Entry, term: Term) -> float:
+def _begin(entry: Entry, term: Term | None) -> float:
     """Return where the search for a new number begins."""
-    away = term.size * entry.sd if entry.kind in ("cause", "delay") else 0.0
+    away = term.size * entry.sd if term and entry.kind in ("cause", "delay") else 0.0
     return float(np.clip(entry.centre + away, entry.low, entry.high))

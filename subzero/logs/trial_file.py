@@ -6,13 +6,15 @@ the record does not say keeps the value of a vehicle at rest; a record without c
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
 import numpy as np
 
 import scenarios
-from subzero.channels import BY_NAME
+from scenarios.heading import TURN
+from subzero.channels import BY_NAME, HEADING
 from subzero.records.record import Record
 
 LIKE = "fig6"
@@ -57,7 +59,9 @@ def trial_of(record: Record, file: str) -> str:
     for key, channel in START.items():
         measured = record.values.get(channel, np.zeros(0))
         first = measured[np.isfinite(measured)][:1]
-        text = _with_value(text, key, repr(round(float(first[0]), DIGITS) if first.size else 0.0))
+        value = float(first[0]) if first.size else 0.0
+        value = math.fmod(value, TURN) if channel == HEADING else value  # a compass may count its turns
+        text = _with_value(text, key, repr(round(value, DIGITS)))
     if all(name in record.values for name in COMMANDS):
         commands = f'[commands]\nfile = "{file}"\n'
     else:

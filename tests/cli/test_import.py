@@ -201,6 +201,14 @@ def test_a_trial_begins_where_the_record_begins_and_lasts_as_long(tmp_path, monk
     assert main(["import", "log.csv", "--out", "flown.csv", "--trial", "flown.toml"]) == 2
 
 
+def test_a_trial_begins_within_a_turn_where_a_compass_counts_its_turns(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rows = "\n".join(f"{0.5 * k},{376.0 + k}" for k in range(41))
+    Path("log.csv").write_text(f"time_s,heading_deg\n{rows}\n")
+    assert main(["import", "log.csv", "--out", "flown.csv", "--trial", "flown.toml"]) == 0
+    assert np.degrees(subzero.load_scenario("flown.toml").start.heading) == pytest.approx(16.0)
+
+
 def test_a_trial_takes_the_commands_of_a_record(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     names = [

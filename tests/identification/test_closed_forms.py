@@ -134,10 +134,7 @@ def test_the_density_of_a_channel_given_the_others_is_that_of_a_gaussian():
     rng = np.random.default_rng(5)
     time, noise = np.cumsum(rng.uniform(0.05, 0.4, 50)), Noise(0.3, 0.7, 1.5)
     K, e = rng.standard_normal((50, 4)), rng.standard_normal(50)
-    given = Filter.of(noise, 0.0, time)
-    found = log_marginal(
-        given.decay, given.gain, given.scale, np.column_stack([K, e]), np.empty((5, 5)), np.empty((2, 5))
-    )
+    found = log_marginal(Filter.of(noise, 0.0, time), np.column_stack([K, e]))
     exact = multivariate_normal.logpdf(e, np.zeros(50), covariance(noise, time) + K @ K.T)
     assert found - 25.0 * np.log(2.0 * np.pi) == pytest.approx(exact, abs=1e-8)
 
@@ -160,18 +157,9 @@ def test_a_channel_given_the_others_changes_the_evidence_as_all_channels_togethe
     linear = linearised(problem, (), entries, np.array([0.9, 0.5]), Levels({"y": first, "z": first}, {}))
     products = Products(problem, (), linear.e, linear.J)
     samples, columns_given = given_others(problem, linear, products, linear.levels, "y")
-    count = columns_given.shape[1]
 
     def alone(noise):
-        filtered = Filter.of(noise, 0.0, samples)
-        return log_marginal(
-            filtered.decay,
-            filtered.gain,
-            filtered.scale,
-            columns_given,
-            np.empty((count, count)),
-            np.empty((2, count)),
-        )
+        return log_marginal(Filter.of(noise, 0.0, samples), columns_given)
 
     def together(noise):
         total = products.total({"y": noise, "z": first})
