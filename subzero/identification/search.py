@@ -1,8 +1,8 @@
 """The search for explanations: ranked in the linear problem, the best fitted with simulations; add, drop, swap.
 
 It begins twice: at the nominal model, where gross errors in the data are plain whatever a fit would bend, and at the
-fit of "nothing is wrong". Without a gross error a fit bends the model to the wrong readings: what may stand in its
-place is judged where the fit with it ends.
+fit of "nothing is wrong". Without a gross error a fit moves the parameters to suit the wrong readings: what may stand
+in its place is judged where the fit with it ends.
 """
 
 from __future__ import annotations
