@@ -1,10 +1,10 @@
 """Checkpoints of long runs: a run that was killed goes on from there, and ends as if nothing had happened.
 
-A checkpoint is a folder. `simulate` makes several runs of a trial (`subzero.simulation.refinement`), some of them side
-by side; each has a folder in it, named by a digest of its steps and segments, with one file, ``state.npz``: all that
-changes in a run, and its recording so far. The file is replaced as a whole by one renaming, so a process that is killed
-leaves the last one. What is read back are the same bits, and a run does not know how many of its steps were taken at a
-time: so the rest of the run is the same to the last bit, too.
+A checkpoint is a folder. `simulate` makes several runs of a trial (`subzero.simulation.refinement`), always in the same
+order; each has a numbered folder in it with one file, ``state.npz``: all that changes in a run, and its recording so
+far. The file is replaced as a whole by one renaming, so a process that is killed leaves the last one. What is read back
+are the same bits, and a run does not know how many of its steps were taken at a time: so the rest of the run is the
+same to the last bit, too.
 
 The file holds numbers only (``allow_pickle=False``), with a digest of its own; kinds and shapes of all arrays are
 checked before compiled code, which does not look at bounds, gets them. ``manifest.json`` says what they belong to.
@@ -26,16 +26,14 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-import scenarios
 from cable.memory import fits
 from cable.moving_end import enlarged
 from subzero.arguments import checked_arguments
-from subzero.engine.recording import BY_NODE, BY_TIME, Grid, Recording, RunState, new_recording, row_of
+from subzero.engine.recording import BY_NODE, BY_TIME, Recording, RunState, new_recording, row_of
 from subzero.errors import UserError, checked, printable
 from subzero.files.atomic_output import DISK_FULL
 from subzero.files.integrity import DamagedError, append_digest, check_arrays, without_digest
 from subzero.jit import Record
-from subzero.simulation.provenance import digest_of, trial_digest
 
 MANIFEST, STATE, LOCK = "manifest.json", "state.npz", "lock"
 COUNTS = ("behind", "used", "ending", "room")
@@ -91,12 +89,12 @@ class Keeper:
     """
 
     def __init__(self, folder: Path, every: float) -> None:
-        self._folder, self._every = folder, every
+        self._folder, self._every, self._runs = folder, every, 0
 
-    def run_of(self, trial: scenarios.Trial, grid: Grid) -> KeptRun:
-        """Return the keeper of a run of a trial: two runs are made at the same time, so their order does not count."""
-        resolution = digest_of([trial_digest(trial), grid.parts, grid.times, grid.booked])
-        return KeptRun(self._folder / f"run-{resolution[:16]}", self._every)
+    def next_run(self) -> KeptRun:
+        """Return the keeper of the next run."""
+        self._runs += 1
+        return KeptRun(self._folder / f"run-{self._runs}", self._every)
 
 
 class KeptRun:

@@ -182,7 +182,12 @@ class Budget:
 
 
 def run_converged(
-    trial: scenarios.Trial, take: Take, budget: Budget, progress: Progress | None = None
+    trial: scenarios.Trial,
+    take: Take,
+    budget: Budget,
+    progress: Progress | None = None,
+    *,
+    side_by_side: bool = True,
 ) -> tuple[Run, Accuracy | None]:
     """Run a trial as finely as its `rtol` asks for and a budget allows, and say how far its force can be trusted.
 
@@ -191,6 +196,7 @@ def run_converged(
         take: makes a run.
         budget: of the finer runs; granted here.
         progress: called with the fraction that is done; it goes back where a run is repeated.
+        side_by_side: make the coarser run while the run itself is made, in a second thread; else after it.
 
     Returns:
         the run, with rows at the times of the trial however fine it is; and its accuracy, None for one too short.
@@ -206,7 +212,8 @@ def run_converged(
     with _second_run(take, coarser, _only_traced(coarse_times, 1)) as started:
 
         def reported(fraction: float) -> None:
-            started()  # not before: the first thread compiles, as no signal breaks in on that
+            if side_by_side:
+                started()  # not before: the first thread compiles, as no signal breaks in on that
             if progress is not None:
                 progress(fraction)
 

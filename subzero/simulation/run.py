@@ -213,7 +213,8 @@ def _as_fine_as_asked(
     refuse_what_cannot_fit(
         trial, model, tethered, Grid(trial.times(), 1, trial.stride)
     )  # before a coarser run
-    return run_converged(trial, _taker(model, keeper), budget, progress)
+    # Checkpoints are numbered in the order in which runs are made.
+    return run_converged(trial, _taker(model, keeper), budget, progress, side_by_side=keeper is None)
 
 
 def _taker(model: Model, keeper: Keeper | None) -> Take:
@@ -249,7 +250,7 @@ def run_trial(
         from subzero.simulation.feng_allen import run_as_printed
 
         return run_as_printed(trial, model, progress)
-    kept = keeper.run_of(trial, grid) if keeper is not None else None
+    kept = keeper.next_run() if keeper is not None else None
     now = _initial_run_state(trial, model, tethered, grid)
     now = kept.go_on(now) if kept is not None else now
     pace = Pace()
