@@ -104,8 +104,9 @@ def started(words, folder, cache=None):
 
 
 def heed_again():
-    """Let a command heed SIGINT though this process was started with it ignored, as jobs in the background are."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    """Let a command heed signals that this process was started with ignored, as jobs in the background are."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
 def heeds(pid):
@@ -121,11 +122,11 @@ def heeds(pid):
 @functools.cache
 def seconds(name, folder):
     """Return how long a command takes that nobody interrupts; None where the folder of its outputs is whole."""
-    started = time.monotonic()
+    began = time.monotonic()
     command = started(SLOW_COMMANDS[name], folder)
     out, err = command.communicate()
     assert command.returncode == 0, (out, err)
-    return time.monotonic() - started
+    return time.monotonic() - began
 
 
 @pytest.fixture(scope="module")
