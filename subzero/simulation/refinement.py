@@ -34,9 +34,8 @@ cable that is bent sharply near the drum errs in its segments only, and its step
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from math import inf
@@ -209,16 +208,12 @@ def run_converged(
     if coarser is None or coarse_times.size < 3:
         return take(trial, whole, progress), None
     # The coarse run is there for its force alone, so its energies and shapes are not kept.
-    with _second_run(take, coarser, _only_traced(coarse_times, 1)) as started:
-
-        def reported(fraction: float) -> None:
-            if side_by_side:
-                started()  # not before: the first thread compiles, as no signal breaks in on that
-            if progress is not None:
-                progress(fraction)
-
-        run = take(trial, whole, reported)
-        coarse = started().result()
+    coarse_grid = _only_traced(coarse_times, 1)
+    if side_by_side:
+        run, coarse = _side_by_side(take, (trial, whole), (coarser, coarse_grid), progress)
+    else:
+        run = take(trial, whole, _share(progress, 0.0, 0.7))
+        coarse = _taken(take, coarser, coarse_grid, _share(progress, 0.7, 0.3))
     # The budget depends on the work of the run as asked for, which is known only now.
     budget.grant(run)
     if coarse is None:
@@ -301,11 +296,15 @@ def _taken(take: Take, trial: scenarios.Trial, grid: Grid, progress: Progress | 
         return None
 
 
-@contextmanager
-def _second_run(take: Take, trial: scenarios.Trial, grid: Grid) -> Iterator[Callable[[], Future[Run | None]]]:
-    """Return a function that makes a run as `_taken` does in a second thread, from its first call on.
+def _side_by_side(
+    take: Take,
+    asked: tuple[scenarios.Trial, Grid],
+    coarser: tuple[scenarios.Trial, Grid],
+    progress: Progress | None,
+) -> tuple[Run, Run | None]:
+    """Return the run that was asked for, and a coarser one that is made in a second thread in the meantime.
 
-    Leaving the block ends a run whose result was not awaited, soon, and waits for that.
+    An error or an interrupt of the one ends the other one soon, and is raised after that.
     """
     ended = Event()
 
@@ -314,8 +313,15 @@ def _second_run(take: Take, trial: scenarios.Trial, grid: Grid) -> Iterator[Call
             raise CancelledError
 
     with ThreadPoolExecutor(1) as second:
+        started = cache(lambda: second.submit(_taken, take, *coarser, go_on))
+
+        def reported(fraction: float) -> None:
+            started()  # not before: the first thread compiles, as no signal breaks in on that
+            if progress is not None:
+                progress(fraction)
+
         try:
-            yield cache(lambda: second.submit(_taken, take, trial, grid, go_on))
+            return take(*asked, reported), started().result()
         finally:
             ended.set()
 
