@@ -9,7 +9,9 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib.metadata import version
+from multiprocessing import parent_process
 from pathlib import Path
+from threading import current_thread, main_thread
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -214,7 +216,13 @@ def _as_fine_as_asked(
         trial, model, tethered, Grid(trial.times(), 1, trial.stride)
     )  # before a coarser run
     # Checkpoints are numbered in the order in which runs are made.
-    return run_converged(trial, _taker(model, keeper), budget, progress, side_by_side=keeper is None)
+    side_by_side = keeper is None and _is_alone()
+    return run_converged(trial, _taker(model, keeper), budget, progress, side_by_side=side_by_side)
+
+
+def _is_alone() -> bool:
+    """Return whether this is no thread and no process among many: these keep all processors busy as it is."""
+    return current_thread() is main_thread() and parent_process() is None
 
 
 def _taker(model: Model, keeper: Keeper | None) -> Take:
