@@ -36,8 +36,6 @@ WITHIN = 5.0
 """Explanations within this of the best are expanded, too. [nats]"""
 WORTH, GROSS = 3.0, 100.0
 """A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one. [nats]"""
-SAME_POINT = 0.3
-"""Columns of a cause serve while no number of the model moves by more, in standard deviations of its prior. [-]"""
 OF_MODEL = ("number", "start", "unknown")
 """Kinds of entries that every explanation has."""
 TWINS = ("offset", "scale", "affine", "delay")
@@ -81,9 +79,6 @@ class Search:
         self._expanded: dict[tuple[str, ...], float] = {}
         self._tried: set[Key] = set()
         self._added: dict[int, tuple[Linear, list[tuple[float, Linear]]]] = {}
-        self._columns: dict[
-            tuple[str, float], tuple[dict[tuple[str, str, int, int], float], dict[str, np.ndarray]]
-        ] = {}
         self._terms = declared(self.problem)
         self._loggers = {name: sensor.logger for name, sensor in self.problem.model.channels.items()}
 
@@ -285,25 +280,6 @@ class Search:
         found = [(self._linear_score(linear), linear) for linear in there if linear]
         return sorted(found, key=lambda pair: -pair[0])
 
-    def _columns_of(
-        self, terms: Terms, entries: list[Entry], x: np.ndarray, fresh: list[int], new: Term | None
-    ) -> dict[str, np.ndarray]:
-        """Return the columns of fresh entries at x; those of a cause that begins switched off are kept while the rest
-        of the model has hardly moved.
-        """
-        off = new is not None and new.kind == "cause" and not new.size
-        if new is None or not off:
-            return self.problem.jacobian(terms, entries, x, fresh)
-        rest = [(entry.identity, value / entry.sd) for entry, value in zip(entries, x.tolist(), strict=True)
-                if entry.kind in OF_MODEL]  # fmt: skip
-        here, name = dict(rest), (new.id, new.begins)
-        if name in self._columns:
-            there, columns = self._columns[name]
-            if there.keys() == here.keys() and max(abs(here[k] - there[k]) for k in here) < SAME_POINT:
-                return columns
-        self._columns[name] = (here, self.problem.jacobian(terms, entries, x, fresh))
-        return self._columns[name][1]
-
     def there(self, base: Linear, terms: Terms, new: Term | None = None) -> Linear | None:
         """Return another explanation, linearised at the point of a base, its new term where that begins; None if it
         cannot be simulated there.
@@ -321,7 +297,7 @@ class Search:
         found, valid = problem.residuals(terms, entries, [x])
         if not valid[0]:
             return None
-        own = self._columns_of(terms, entries, x, fresh, new) if fresh else {}
+        own = self.problem.jacobian(terms, entries, x, fresh) if fresh else {}
         J = {}
         for name, before in base.J.items():
             J[name] = np.empty((before.shape[0], len(entries)))
