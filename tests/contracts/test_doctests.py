@@ -8,7 +8,7 @@ import pytest
 MODULES = (
     "scenarios", "scenarios.checks", "scenarios.instructions", "scenarios.steps", "cable.current", "cable.schemes",
     "subzero.model",
-    "subzero.simulation.stepper",
+    "subzero.simulation.stepper", "subzero.diagnosis.assessment.trial_library",
 )  # fmt: skip
 
 

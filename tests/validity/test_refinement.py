@@ -14,6 +14,8 @@ import scenarios
 import subzero
 from subzero.cli.app import FINE, STOPPED, main
 from subzero.simulation.comparison import halved
+from subzero.simulation.refinement import Budget, run_converged
+from subzero.simulation.run import run_trial
 
 SHORT = dataclasses.replace(subzero.load_scenario("fig6"), duration=4.0, rtol=0.0)
 
@@ -27,6 +29,24 @@ def test_the_finer_run_has_half_the_steps_and_segments(refinement):
     assert refinement.finer.sizes["time"] == 2 * refinement.run.sizes["time"] - 1
     fine = halved(SHORT)
     assert (fine.hull_step, fine.cable_step, fine.segment_length) == (0.01, 0.05, 0.25)
+
+
+@pytest.mark.parametrize("side_by_side", [True, False])
+def test_the_accuracy_of_a_run_is_its_change_from_twice_as_long_steps_and_segments(side_by_side):
+    trial, made = dataclasses.replace(SHORT, rtol=0.5), {}
+
+    def take(each, grid, progress):
+        made[each.segment_length, grid.times.size] = run = run_trial(
+            each, subzero.Model.of(trial), True, progress, grid=grid
+        )
+        return run
+
+    run, accuracy = run_converged(trial, take, Budget(), side_by_side=side_by_side)
+    assert run is made[0.5, 41]
+    fine, coarse = (each.recording.trace[:, :3] for each in (run, made[1.0, 21]))
+    gap = np.linalg.norm(fine[::2] - coarse, axis=1)[3:]  # the first five steps are the start
+    change = gap.max() / np.linalg.norm(fine, axis=1).max()
+    assert accuracy.change == pytest.approx(change, rel=1e-12)
 
 
 def test_the_table_holds_the_largest_change_of_every_channel_worst_first(refinement):

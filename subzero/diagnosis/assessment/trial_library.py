@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 import scenarios
+from scenarios.steps import held
 
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.configuration import Setting
@@ -40,11 +41,25 @@ def fastest(setting: Setting) -> float:
 
 
 def flown(setting: Setting, rows: Sequence[Row], duration: float) -> Setting:
-    """Return the setting with other commands and another duration [s]; listed actuators keep theirs."""
+    """Return the setting with other commands and another duration [s]; listed actuators keep theirs.
+
+    >>> import subzero
+    >>> from subzero.diagnosis import Setting
+    >>> glider = subzero.load_scenario("glider_sawtooth")
+    >>> given = Setting(trial=glider, model=subzero.Model.of(glider))
+    >>> commands = flown(given, [(0.0, 5.0, 0.0, 0.0, 0.0), (400.0, 7.0, 0.0, 0.0, 0.0)], 500.0).trial.commands
+    >>> commands.listed
+    ('battery_slide', 'battery_turn', 'bladder')
+    >>> commands.at(np.array([0.0, 300.0, 400.0]))[:, [0, 4, 6]].tolist()
+    [[5.0, 0.02, -0.0003], [5.0, -0.02, 0.0003], [7.0, -0.02, 0.0003]]
+    """
     table, before = np.array(rows, dtype=float), setting.trial.commands
     assert before is not None
-    values = np.column_stack([table[:, 1:], before.at(table[:, 0])[:, table.shape[1] - 1 :]])
-    commands = scenarios.Commands(time=table[:, 0].copy(), values=values, listed=before.listed)
+    time = np.union1d(table[:, 0], before.time) if before.listed else table[:, 0].copy()
+    values = np.column_stack(
+        [held(table[:, 0], table[:, 1:], time), before.at(time)[:, table.shape[1] - 1 :]]
+    )
+    commands = scenarios.Commands(time=time, values=values, listed=before.listed)
     return replace(setting, trial=replace(setting.trial, commands=commands, duration=duration, motion=None))
 
 
