@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from itertools import chain
 from math import cos, degrees, pi, radians, sin
 from typing import Any
@@ -27,7 +26,8 @@ from subzero.arguments import checked_arguments
 from subzero.channels import Observation
 from subzero.errors import BadValueError, checked, missing_extra, short, whole
 from subzero.model import load
-from subzero.simulation.stepper import RunStoppedError, Simulator, hold_together
+from subzero.simulation.stepper import RunStoppedError, Simulator
+from subzero.simulation.stepping_group import SteppingGroup
 
 try:
     import gymnasium
@@ -152,8 +152,12 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
             stopped = False
         except RunStoppedError:
             stopped = True
-        self._taken += 1
+        self.count()
         return stopped
+
+    def count(self) -> None:
+        """Count a step of the episode."""
+        self._taken += 1
 
     def order(self, share: float) -> tuple[float, float, float, float]:
         """Return the command with the rudder at a share of its limit: propeller [rev/s], three fins [rad]."""
@@ -167,6 +171,11 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
     def is_over(self) -> bool:
         """Whether the episode has had all its steps."""
         return self._taken >= STEPS
+
+    @property
+    def simulator(self) -> Simulator:
+        """The simulation."""
+        return self._sim
 
     @property
     def seen(self) -> Observation:
@@ -192,15 +201,6 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
     def _info(self) -> dict[str, Any]:
         """Return the whole truth, by name, and the heading that is wanted [rad]."""
         return dict(zip(TRUTH, (self._wanted, *self._sim.seen.tolist()), strict=True))
-
-
-def hold_all(environments: Sequence[TetheredHeading], shares: Sequence[float]) -> list[bool]:
-    """Hold the rudders of some environments of one kind as `TetheredHeading.hold` does, in one compiled call."""
-    orders = np.array([each.order(share) for each, share in zip(environments, shares, strict=True)])
-    stopped = hold_together([each._sim for each in environments], orders)
-    for each in environments:
-        each._taken += 1
-    return stopped
 
 
 def _shares(actions: Any, count: int) -> list[float]:
@@ -236,17 +236,16 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         self._ours: list[Any] = list(self.envs)
         workers = (os.cpu_count() or 1) if workers is None else workers
         threads = min(whole("TetheredHeadings: workers", workers, least=1), num_envs)
-        self._mine, *self._others = (part.tolist() for part in np.array_split(np.arange(num_envs), threads))
-        self._pool = ThreadPoolExecutor(threads)
+        self._group = SteppingGroup([our.simulator for our in self._ours], threads)
 
     def step(
         self, actions: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold each rudder for one sample time, (num_envs, 1); return the same in arrays as each environment does."""
         rudders = _shares(actions, self.num_envs)
-        others = [self._pool.submit(self._held, part, rudders) for part in self._others]
-        mine = self._held(self._mine, rudders)
-        ended = np.array([*mine, *chain.from_iterable(other.result() for other in others)])
+        ended = np.array(
+            self._held_one_by_one(rudders) if self._autoreset_envs.any() else self._held(rudders)
+        )
         seen, wanted = (np.array(each) for each in zip(*(our.truth for our in self._ours), strict=True))
         errors = (wanted - seen[:, HEADING]).tolist()
         rewards = np.array(list(map(self._ours[0].reward, errors, rudders)))
@@ -255,14 +254,21 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         self._autoreset_envs = ended | cut
         return self._observed(errors, seen), rewards, ended, cut, self._infos(wanted, seen)
 
-    def _held(self, which: list[int], rudders: list[float]) -> list[bool]:
-        """Step some environments, or start them again where an episode is over; return which simulations stopped."""
-        if not self._autoreset_envs[which].any():
-            return hold_all([self._ours[i] for i in which], [rudders[i] for i in which])
-        for i in which:
-            if self._autoreset_envs[i]:
-                self._ours[i].reset()
-        return [not self._autoreset_envs[i] and self._ours[i].hold(rudders[i]) for i in which]
+    def _held(self, rudders: list[float]) -> list[bool]:
+        """Step all environments, side by side; return which simulations stopped."""
+        orders = np.array([our.order(share) for our, share in zip(self._ours, rudders, strict=True)])
+        for our in self._ours:
+            our.count()
+        return self._group.hold(orders)
+
+    def _held_one_by_one(self, rudders: list[float]) -> list[bool]:
+        """Step the environments, and start those again whose episode is over; return which simulations stopped."""
+        for i in np.flatnonzero(self._autoreset_envs):
+            self._ours[i].reset()
+        return [
+            not again and our.hold(share)
+            for our, share, again in zip(self._ours, rudders, self._autoreset_envs.tolist(), strict=True)
+        ]
 
     def _observed(self, errors: list[float], seen: np.ndarray) -> np.ndarray:
         """Return the observations of the agents, within the limits of their space (num_envs, 6)."""
@@ -278,7 +284,7 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
     def close_extras(self, **kwargs: Any) -> None:
         """End the threads."""
         super().close_extras(**kwargs)
-        self._pool.shutdown()
+        self._group.close()
 
 
 def register() -> None:

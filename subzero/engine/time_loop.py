@@ -18,6 +18,8 @@ from subzero.engine.coupling import FINE, exchange
 from subzero.engine.recording import Recording, note, record_row, row_of
 from subzero.engine.run_state import Live, Setup
 from subzero.jit import allocating, compiled, deferred_signals
+from subzero.jit.atomic import add
+from subzero.jit.atomic import exchange as exchange_number
 
 NO_ROOM = 4
 """The allocated memory is nearly full: enlarge it and go on. The other endings are in `coupling`."""
@@ -101,6 +103,10 @@ class _Reference(structref.StructRefProxy):
     """A run as one pointer; the caller that made it must keep the arrays alive."""
 
 
+class _Batch(structref.StructRefProxy):
+    """Some runs as one pointer."""
+
+
 class _Interpreted(NamedTuple):
     """The same for code that is not compiled."""
 
@@ -110,9 +116,22 @@ class _Interpreted(NamedTuple):
     times: np.ndarray
 
 
+class _InterpretedBatch(NamedTuple):
+    """The same of some runs, see `hold_batch`."""
+
+    handles: tuple[Any, ...]
+    at: tuple[np.ndarray, ...]
+    seen: tuple[np.ndarray, ...]
+    orders: np.ndarray
+    taken: np.ndarray
+    done: np.ndarray
+
+
 structref.define_boxing(_HandleType, _Reference)
 structref.define_constructor(_Reference, _HandleType, FIELDS)
+structref.define_constructor(_Batch, _HandleType, _InterpretedBatch._fields)
 Handle: Any = _Interpreted if numba.config.DISABLE_JIT else _Reference
+Batch: Any = _InterpretedBatch if numba.config.DISABLE_JIT else _Batch
 
 
 ROW, USED, ENDING = range(3)
@@ -135,6 +154,27 @@ def hold(setup: Setup, live: Live, recording: Recording, times: np.ndarray) -> A
 def make_handle(setup: Setup, live: Live, recording: Recording, times: np.ndarray) -> Any:
     """Return a handle of a run; `hold` makes it safely."""
     return Handle(setup, live, recording, times)
+
+
+def hold_batch(handles: Any, at: Any, seen: Any, orders: np.ndarray) -> Any:
+    """Return a handle of some runs at once, which any number of threads advance together: `begin`, `share`.
+
+    Args:
+        handles: of the runs, a tuple.
+        at: where each stands, a tuple of arrays; changed, with its ending.
+        seen: what each fills, a tuple of arrays.
+        orders: command of each (runs, 4), in the units of `advance`.
+    """
+    with deferred_signals():
+        return make_batch(handles, at, seen, orders, np.full(1, len(handles)), np.full(1, len(handles)))
+
+
+@allocating
+def make_batch(
+    handles: Any, at: Any, seen: Any, orders: np.ndarray, taken: np.ndarray, done: np.ndarray
+) -> Any:
+    """Return a handle of some runs, of which so many are taken and done; `hold_batch` makes it safely."""
+    return Batch(handles, at, seen, orders, taken, done)
 
 
 @allocating
@@ -177,19 +217,35 @@ def advance(
 
 
 @allocating
-def advance_all(handles: Any, at: Any, seen: Any, count: int, orders: np.ndarray) -> None:
-    """Take so many exchanges of each of some runs, one after another: Python's lock is let go of once, not each time.
+def begin(batch: Any) -> None:
+    """Let threads take the runs of a batch, whose orders are written, and which no thread advances."""
+    exchange_number(batch.done, 0)
+    exchange_number(batch.taken, 0)
 
-    Args:
-        handles: of the runs, a tuple.
-        at: where each stands, a tuple of arrays; changed, with its ending.
-        seen: what each has filled, a tuple of arrays.
-        count: how many exchanges.
-        orders: command of each (runs, 4), in the units of `advance`.
+
+LOOKS = 20_000
+"""So often `share` looks, for some ten microseconds, whether other threads are done with what they have taken."""
+
+
+@allocating
+def share(batch: Any, count: int) -> bool:
+    """Take so many exchanges of each run of a batch that no thread has taken yet, one after another.
+
+    A thread that is late has less to do, or nothing; the lock of Python is let go of once.
+
+    Returns:
+        whether all runs are done; another thread may still be busy with one.
     """
-    for i in range(len(handles)):
+    orders, i = batch.orders, add(batch.taken, 1)
+    while i < len(batch.handles):
         n, rudder, port, starboard = orders[i, 0], orders[i, 1], orders[i, 2], orders[i, 3]
-        advance(handles[i], at[i], count, n, rudder, port, starboard, seen[i])
+        advance(batch.handles[i], batch.at[i], count, n, rudder, port, starboard, batch.seen[i])
+        add(batch.done, 1)
+        i = add(batch.taken, 1)
+    looks = 0
+    while looks < LOOKS and add(batch.done, 0) < len(batch.handles):
+        looks += 1
+    return bool(add(batch.done, 0) == len(batch.handles))
 
 
 @allocating

@@ -38,7 +38,7 @@ from subzero.engine import coupling
 from subzero.engine.initial_conditions import prepare
 from subzero.engine.recording import Recording, Run, cut, new_recording, record_row
 from subzero.engine.run_state import Live, Orders, Setup
-from subzero.engine.time_loop import ENDING, NO_ROOM, ROW, USED, advance, advance_all, hold, observe
+from subzero.engine.time_loop import ENDING, NO_ROOM, ROW, USED, advance, hold, observe
 from subzero.errors import UserError, real, short, suggestion
 from subzero.model import Model, load, model_of
 from subzero.simulation.run import WENT_WELL, enlarged_run, in_words
@@ -278,30 +278,6 @@ class Simulator:
         """Raise an error if a step has failed before."""
         if self._held.at[ENDING] not in WELL:
             raise RunStoppedError(self._message())
-
-
-def hold_together(simulators: Sequence[Simulator], orders: np.ndarray) -> list[bool]:
-    """Hold a command in each of some simulators, as `Simulator.hold` does, in one call of compiled code.
-
-    Args:
-        simulators: of one trial, one model and one sample time, none of which has stopped.
-        orders: propeller [rev/s], rudder, port and starboard stern-plane [rad] of each (simulators, 4).
-
-    Returns:
-        which of them cannot go on.
-    """
-    goals = [each._goal() for each in simulators]
-    held = [each._held for each in simulators]
-    handles, at, seen = (
-        tuple(parts) for parts in zip(*((h.handle, h.at, h.seen) for h in held), strict=True)
-    )
-    advance_all(handles, at, seen, simulators[0]._exchanges, orders)
-    endings = [int(each[ENDING]) for each in at]
-    for i, ending in enumerate(endings):
-        if ending == NO_ROOM:
-            simulators[i]._reach(goals[i], *orders[i].tolist())
-            endings[i] = int(simulators[i]._held.at[ENDING])
-    return [ending not in WELL for ending in endings]
 
 
 def _with_rows(held: Held, goal: int) -> Held:

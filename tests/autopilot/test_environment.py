@@ -15,6 +15,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import subzero.gym_environment
+from subzero.simulation import stepping_group
 
 
 @pytest.fixture
@@ -97,16 +98,16 @@ def test_many_at_once_are_those_of_one_after_another_to_the_last_bit(monkeypatch
 @pytest.mark.parametrize("how, threads", [({}, 2), ({"sample_time": 1.0}, 2), ({"workers": 1}, 1)])
 def test_each_processor_has_a_thread_if_nothing_else_is_asked_for(monkeypatch, how, threads):
     """On a machine of two processors."""
-    ours, used, meet = subzero.gym_environment, set(), threading.Barrier(threads)
-    hold_all = ours.hold_all
+    used, meet, share = set(), threading.Barrier(threads), stepping_group.share
 
-    def seen_to_hold(*how):
-        used.add(threading.get_ident())
-        meet.wait(timeout=60.0)  # until as many are here as there are threads
-        return hold_all(*how)
+    def seen_to_share(*how):
+        if threading.get_ident() not in used:
+            used.add(threading.get_ident())
+            meet.wait(timeout=60.0)  # until as many are here as there are threads
+        return share(*how)
 
-    monkeypatch.setattr(ours.os, "cpu_count", lambda: 2)
-    monkeypatch.setattr(ours, "hold_all", seen_to_hold)
+    monkeypatch.setattr(subzero.gym_environment.os, "cpu_count", lambda: 2)
+    monkeypatch.setattr(stepping_group, "share", seen_to_share)
     made = gymnasium.make_vec(subzero.gym_environment.ENVIRONMENT, num_envs=2, **how)
     made.reset(seed=1)
     made.step(np.zeros((2, 1), dtype=np.float32))
