@@ -87,7 +87,26 @@ class PlainRun:
         """Return it as a labelled dataset, on the same arrays."""
         import xarray as xr
 
-        return xr.Dataset(self.variables, coords=self.coordinates, attrs=self.attrs)
+        made = {name: xr.Variable(*variable) for name, variable in self.coordinates.items()}
+        indexes = {name: _index(name, made[name].values) for name in made if made[name].dims == (name,)}
+        for name, index in indexes.items():
+            made |= index.create_variables({name: made[name]})
+        return xr.Dataset(self.variables, coords=xr.Coordinates(made, indexes), attrs=self.attrs)
+
+
+def _index(name: str, values: np.ndarray) -> Any:
+    """Return the index of an axis; those of `AXES` are made once, as pandas takes long for texts."""
+    from xarray.indexes import PandasIndex
+
+    return _label_index(name) if name in AXES else PandasIndex(values, name, coord_dtype=values.dtype)
+
+
+@cache
+def _label_index(name: str) -> Any:
+    from xarray.indexes import PandasIndex
+
+    labels = np.array(AXES[name][0])
+    return PandasIndex(labels, name, coord_dtype=labels.dtype)
 
 
 def plain_run(
