@@ -6,7 +6,7 @@ problem → search → nearness → locks → verdict
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -40,6 +40,8 @@ NAMED_PROBABILITY = 0.9
 """A term is named from this probability on, over all explanations."""
 SEEN_ODDS = 9.0
 """Odds from which on a term would be seen: of NAMED_PROBABILITY."""
+PASSES = 3
+"""Most searches of a diagnosis, each without the outliers that the one before has shown."""
 RELATED = 3.0
 """Channels differ if all explanations say so, by so many standard deviations."""
 
@@ -72,14 +74,29 @@ def diagnose(
     given = [records] if isinstance(records, Record) else list(records)
     kept = [held_out] if isinstance(held_out, Record) else list(held_out)
     with threadpool_limits(limits=1, user_api="blas"):  # matrices are small
-        problem = Problem(model, given)
-        search = Search(problem, report)
-        search.run()
+        search, outliers = _searched(model, given, report)
         report(0.9, "locks")
-        return _concluded(search, kept)
+        return _concluded(search, kept, outliers)
 
 
-def _concluded(search: Search, held_out: Sequence[Record]) -> Verdict:
+def _searched(model: Model, records: Sequence[Record], report: Progress) -> tuple[Search, dict[str, int]]:
+    """Return the search, made again where its best explanation shows outliers that could not be seen before; and
+    channel → how many.
+    """
+    count: dict[str, int] = {}
+    for last in range(PASSES):
+        search = Search(Problem(model, records), report)
+        search.run()
+        best = search.ranked()[0]
+        outliers = search.problem.outliers(best.terms, best.linear.e)
+        if not outliers or last == PASSES - 1:
+            break
+        records = search.problem.without(outliers)
+        count |= {name: count.get(name, 0) + int(found.sum()) for name, found in outliers.items()}
+    return search, count
+
+
+def _concluded(search: Search, held_out: Sequence[Record], outliers: Mapping[str, int]) -> Verdict:
     problem, ranked = search.problem, search.ranked()
     best, probabilities = ranked[0], _probabilities(search, ranked)
     free = free_fit(problem, best.terms, best.values)
@@ -106,7 +123,7 @@ def _concluded(search: Search, held_out: Sequence[Record]) -> Verdict:
         budget=budget,
         remainder=_remainder(problem, best, near),
         visible_from=_visible_from(search),
-        notes=_notes(problem, search),
+        notes=_notes(problem, search, outliers),
         curves=tuple(_curves(problem, search, free)),
         complete=search.complete,
     )
@@ -254,12 +271,12 @@ def _contrast(
 
 def _budget(search: Search, best: Fit) -> tuple[Share, ...]:
     """Return what each term of the best explanation takes in free simulation, the largest share first."""
-    problem = search.problem
+    problem, levels = search.problem, search.problem.levels_with(best.terms)
     start = best.values
 
     def left(terms: Terms) -> float:
         e = free_fit(problem, terms, start).linear.e
-        return rms(np.concatenate([e[name][problem.used(name, terms)] / problem.levels[name] for name in e]))
+        return rms(np.concatenate([e[name][problem.used(name, terms)] / levels[name] for name in e]))
 
     shares: list[Share] = []
     here: Terms = ()
@@ -354,12 +371,12 @@ def _sizes(problem: Problem, linear: object, term: Term) -> list[tuple[str, floa
     return found
 
 
-def _notes(problem: Problem, search: Search) -> tuple[str, ...]:
+def _notes(problem: Problem, search: Search, outliers: Mapping[str, int]) -> tuple[str, ...]:
     found = []
     for name, each in problem.channels.items():
-        spikes = int(each.spikes.sum())
+        spikes = int(each.spikes.sum()) + outliers.get(name, 0)
         if spikes:
-            why = "outside the record's time, or alone far from both neighbours"
+            why = "outside the record's time, or alone far from their neighbours or from the best explanation"
             found.append(f"{name}: {spikes} readings are set aside: {why}.")
         if problem.model.channels[name].noise is None:
             found.append(f"{name}: the noise of its sensor, {each.prior.level:.2g}, was read off the record.")

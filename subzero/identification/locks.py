@@ -145,7 +145,7 @@ Fold = tuple[Sequence[Record], Sequence[Record], float]
 
 def _predicted(problem: Problem, best: Fit, terms: Terms, folds: Sequence[Fold]) -> list[np.ndarray]:
     """Return squared residuals of predictions, in levels of the sensors: one row of time for each channel of a fold."""
-    squares = []
+    squares, levels = [], problem.levels_with(best.terms)
     for fitted_records, predicted_records, begin in folds:
         here = tuple(replace(term, record=-1) for term in terms)
         learned = free_fit(Problem(problem.model, fitted_records), here, _shared(best))
@@ -154,8 +154,8 @@ def _predicted(problem: Problem, best: Fit, terms: Terms, folds: Sequence[Fold])
         predicted = free_fit(there, here, learned.values if begin > -math.inf else {})
         for name, e in predicted.linear.e.items():
             kept = there.used(name, here) & (there.channels[name].time > begin)
-            if name in problem.levels and kept.any():
-                squares.append((e[kept] / problem.levels[name]) ** 2)
+            if name in levels and kept.any():
+                squares.append((e[kept] / levels[name]) ** 2)
     return squares
 
 

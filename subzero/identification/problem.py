@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from subzero.errors import UserError
-from subzero.identification.explanation import CLOCK, Entry, Term, Terms, entries_of
+from subzero.identification.explanation import AFFINE, CLOCK, Entry, Term, Terms, entries_of
 from subzero.identification.model import Model
 from subzero.identification.noise import OPEN_SPREAD, NoisePrior, level_of, middle_of_equal, resolution_of
 from subzero.identification.record import Record
@@ -23,6 +23,8 @@ FEWEST_SAMPLES = 8
 """A channel with fewer readings in all records is not used."""
 SPIKE = 5.0
 """A reading so many levels off the middle of those next to it, which agree with one another, is set aside. [-]"""
+RARE = 0.05
+"""Largest share of a channel's readings that are set aside as outliers: more of them say something. [-]"""
 MAX_KNOTS = 200
 """Most knots of one unknown input in one record: its time is lengthened where there would be more."""
 FIXED = 1e-6
@@ -152,6 +154,46 @@ class Problem:
             name: float(np.hypot(each.prior.level, each.prior.resolution / np.sqrt(12.0)))
             for name, each in self.channels.items()
         } | {CLOCK: 1.0}
+
+    def levels_with(self, terms: Terms) -> dict[str, float]:
+        """Return levels of the sensors under an explanation: one that was read off readings of a wrong unit is in that
+        unit, and goes with them.
+        """
+        found = dict(self.levels)
+        for term in terms:
+            of_record = term.target in self.channels and self.model.channels[term.target].noise is None
+            if term.slot[0] == AFFINE and of_record and not np.isfinite(term.begins):
+                found[term.target] /= abs(term.factor)
+        return found
+
+    def outliers(self, terms: Terms, e: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Return channel → which readings (m,) are outliers of an explanation: their residuals are alone far from those
+        next to them, by the rule for readings.
+
+        A signal that jumps hides an outlier from the rule for readings, and only an explanation shows it.
+
+        Args:
+            terms: the explanation.
+            e: channel → its residuals (m,).
+        """
+        levels, found = self.levels_with(terms), {}
+        for name, each in self.channels.items():
+            far = SPIKE * levels[name]
+            alone = spikes(np.where(self.used(name, terms), e[name], np.nan), far, 0.0)
+            if 0 < alone.sum() <= RARE * each.used.sum():
+                found[name] = alone
+        return found
+
+    def without(self, outliers: Mapping[str, np.ndarray]) -> list[Record]:
+        """Return the records with gaps in the place of some readings: channel → which (m,)."""
+        found = []
+        for k, record in enumerate(self.records):
+            columns = dict(record.columns)
+            for name, outlier in outliers.items():
+                if name in columns:
+                    columns[name] = np.where(outlier[self.channels[name].record == k], np.nan, columns[name])
+            found.append(replace(record, columns=columns))
+        return found
 
     @cached_property
     def intervals(self) -> dict[str, float]:
