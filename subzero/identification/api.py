@@ -13,8 +13,8 @@ from threadpoolctl import threadpool_limits
 
 from subzero.arguments import checked_arguments
 from subzero.identification.candidates import declared
-from subzero.identification.explanation import AFFINE, Entry, Term, Terms, kinds_of, with_term
-from subzero.identification.fit import Fit, free_fit
+from subzero.identification.explanation import AFFINE, Entry, Term, kinds_of, with_term, without
+from subzero.identification.fit import Fit, Linear, free_fit, spreads
 from subzero.identification.locks import Locks, locks
 from subzero.identification.model import Model
 from subzero.identification.nearness import Nearness, nearness, rms
@@ -112,7 +112,7 @@ def _concluded(search: Search, held_out: Sequence[Record], outliers: Mapping[str
         each for each in terms if near.near and not each.against and each.probability >= NAMED_PROBABILITY
     )
     suspected = tuple(each for each in terms if each not in named)
-    budget = _budget(search, best)
+    budget = _budget(search, best, free)
     return Verdict(
         verdict=_kind(best, near, named, suspected, probabilities),
         nearness=near,
@@ -269,27 +269,27 @@ def _contrast(
     return (mean, sd) if sd > 0.0 and abs(mean) > RELATED * sd else None
 
 
-def _budget(search: Search, best: Fit) -> tuple[Share, ...]:
-    """Return what each term of the best explanation takes in free simulation, the largest share first."""
+def _budget(search: Search, best: Fit, free: Fit) -> tuple[Share, ...]:
+    """Return what each term of the best explanation takes in free simulation, with those before it: first the term
+    without which most is left, the other numbers as they are.
+    """
     problem, levels = search.problem, search.problem.levels_with(best.terms)
-    start = best.values
+    bare = {term: search.there(free.linear, without(best.terms, term)) for term in best.terms}
+    lacking = {
+        term: _levels_left(problem, linear, levels) if linear else math.inf for term, linear in bare.items()
+    }
+    terms = sorted(best.terms, key=lambda term: -lacking[term])
+    fits = [free_fit(problem, tuple(terms[:count]), best.values) for count in range(len(terms))]
+    left = [_levels_left(problem, fitted.linear, levels) for fitted in (*fits, free)]
+    return tuple(
+        Share(term.id, before, after) for term, before, after in zip(terms, left[:-1], left[1:], strict=True)
+    )
 
-    def left(terms: Terms) -> float:
-        e = free_fit(problem, terms, start).linear.e
-        return rms(np.concatenate([e[name][problem.used(name, terms)] / levels[name] for name in e]))
 
-    shares: list[Share] = []
-    here: Terms = ()
-    before = left(here)
-    remaining = list(best.terms)
-    while remaining:
-        after, term = min(
-            ((left(with_term(here, each)), each) for each in remaining), key=lambda pair: pair[0]
-        )
-        shares.append(Share(term.id, before, after))
-        here, before = with_term(here, term), after
-        remaining.remove(term)
-    return tuple(shares)
+def _levels_left(problem: Problem, linear: Linear, levels: Mapping[str, float]) -> float:
+    """Return what is left of all channels together, root mean square, in levels of their sensors."""
+    e = linear.e
+    return rms(np.concatenate([e[name][problem.used(name, linear.terms)] / levels[name] for name in e]))
 
 
 def _remainder(problem: Problem, best: Fit, near: Nearness) -> str:
@@ -345,10 +345,7 @@ def _visible_from(search: Search) -> dict[str, str]:
     return found
 
 
-def _sizes(problem: Problem, linear: object, term: Term) -> list[tuple[str, float, str]]:
-    from subzero.identification.fit import Linear, spreads
-
-    assert isinstance(linear, Linear)
+def _sizes(problem: Problem, linear: Linear, term: Term) -> list[tuple[str, float, str]]:
     _, _, (factor, _) = linear.evidence(problem)
     sd = spreads(linear.entries, linear.levels)
     half = np.linalg.inv(np.tril(factor))

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from subzero.identification.candidates import OFF_LEVELS, declared, suggested
+from subzero.identification.candidates import declared, suggested
 from subzero.identification.explanation import AFFINE, Entry, Term, Terms, log_prior, with_term, without
 from subzero.identification.fit import (
     Fit,
@@ -22,7 +22,6 @@ from subzero.identification.fit import (
     fitted_levels,
     linearised,
     quieter,
-    unexplained,
     usual_levels,
 )
 from subzero.identification.problem import Problem, Progress
@@ -77,6 +76,7 @@ class Search:
 
     def __post_init__(self) -> None:
         self._expanded: dict[tuple[str, ...], float] = {}
+        self._left: set[Key] = set()
         self._tried: set[Key] = set()
         self._added: dict[int, tuple[Linear, list[tuple[float, Linear]]]] = {}
         self._terms = declared(self.problem)
@@ -97,9 +97,8 @@ class Search:
         nominal = linearised(
             problem, (), entries, np.array([entry.centre for entry in entries]), levels, must=True
         )
-        chain = self._greedy(nominal) if unexplained(problem, nominal) > OFF_LEVELS else []
         self._fit((), nominal)
-        for linear in chain[-1:]:
+        for linear in self._greedy(nominal)[-1:]:
             self._fit(linear.terms, linear)
         while (base := self._next()) is not None:
             if len(self.fits) >= MOST_FITS:
@@ -108,17 +107,18 @@ class Search:
             self._expand(base)
 
     def _next(self) -> Fit | None:
-        """Return the best explanation that was not expanded yet, if it is near the best of all, and no part of it is
-        better: what a term more did not gain, two will not. Nor if it is like one that was, with another known unit of
-        a channel, and not much better.
+        """Return the best explanation that was neither expanded nor left for a better one, if it is near the best of
+        all, and no part of it is better: what a term more did not gain, two will not. Nor if it is like one that was
+        expanded, with another known unit of a channel, and not much better.
         """
         ranked = self.ranked()
         best = self.score(ranked[0])
         for i, each in enumerate(ranked):
             own = set(key(each.terms))
             simpler = any(set(key(other.terms)) < own for other in ranked[:i])
+            done = key(each.terms) in self._left
             like = self._expanded.get(ids(each.terms), -np.inf)
-            if self.score(each) > max(best - WITHIN, like + WITHIN) and not simpler:
+            if self.score(each) > max(best - WITHIN, like + WITHIN) and not (simpler or done):
                 return each
         return None
 
@@ -132,6 +132,7 @@ class Search:
                 gross.append(term)
                 better = max([better, *self._replacements(better, term)], key=self.score)
         if better is not base:
+            self._left.add(key(base.terms))
             return
         self._expanded[ids(base.terms)] = self.score(base)
         self._fit_additions(base.linear)

@@ -75,6 +75,16 @@ def test_a_unit_is_named_whatever_the_parameters_would_bend(factor, words):
     assert words in verdict.named[0].sentence
 
 
+def test_a_search_ends_where_a_unit_and_a_regression_are_nearly_as_probable():
+    """The regression is left for the unit, which was expanded before: neither is looked at again."""
+    seen, sensor = record(1, samples=60), sd.Sensor(noise=0.01, unit="m", zero=1e-4, scale=0.3)
+    one = model(causes=("stiffness", "cubic"), unknown=False, channels={"x": sensor})
+    verdict = sd.diagnose(changed(seen, x=-seen.columns["x"]), one)
+    assert verdict.complete
+    assert [each.id for each in verdict.named] == ["unit:x"]
+    assert "affine:x" in verdict.explanations
+
+
 @pytest.mark.long
 def test_a_factor_that_is_in_no_list_is_found_all_the_same():
     seen = record(1)
