@@ -273,7 +273,7 @@ def _budget(search: Search, best: Fit, free: Fit) -> tuple[Share, ...]:
     """Return what each term of the best explanation takes in free simulation, with those before it: first the term
     without which most is left, the other numbers as they are.
     """
-    problem, levels = search.problem, search.problem.levels_with(best.terms)
+    problem, levels = search.problem, search.problem.levels(best.terms)
     bare = {term: search.there(free.linear, without(best.terms, term)) for term in best.terms}
     lacking = {
         term: _levels_left(problem, linear, levels) if linear else math.inf for term, linear in bare.items()

@@ -74,7 +74,7 @@ def suggested(problem: Problem, linear: Linear, terms: list[Term]) -> list[Term]
 def _of_channel(problem: Problem, linear: Linear, name: str, own: list[Term]) -> Iterator[Term]:
     """Yield errors of a channel: known ones that bring it closer, the regression, those from some time on, runs."""
     each, used = problem.channels[name], problem.used(name, linear.terms)
-    e, level, turn = linear.e[name], problem.levels[name], problem.model.channels[name].turn
+    e, level, turn = linear.e[name], problem.levels(linear.terms)[name], problem.model.channels[name].turn
     simulated = problem.recorded(name, linear.terms) - e
     yield from _stuck(problem, name, simulated)
     before = float(np.mean(e[used] ** 2))
@@ -119,13 +119,13 @@ def _regression(problem: Problem, name: str, simulated: np.ndarray, used: np.nda
     """Return y = a + b x of a channel by least squares, if the readings follow the simulation at all."""
     h, y = simulated[used], problem.channels[name].values[used]
     spread = float(np.std(h))
-    if spread <= problem.levels[name] or problem.model.channels[name].angle:
+    if spread <= problem.levels()[name] or problem.model.channels[name].angle:
         return None
     b = float(np.mean((h - h.mean()) * (y - y.mean()))) / spread**2
     if abs(b) < 1e-3 or b**2 * spread**2 < 0.5 * float(np.var(y)):
         return None
     a = float(np.mean(y - b * h))
-    usual = (abs(b - 1.0) < SOFT * GAIN_SCALE, abs(a) < SOFT * OFFSET_LEVELS * problem.levels[name])
+    usual = (abs(b - 1.0) < SOFT * GAIN_SCALE, abs(a) < SOFT * OFFSET_LEVELS * problem.levels()[name])
     if all(usual):  # an offset or an error of scale serves
         return None
     odds = ANY_FACTOR * data_odds(problem)
@@ -180,7 +180,7 @@ def _stuck(problem: Problem, name: str, simulated: np.ndarray) -> Iterator[Term]
         first, last = int(starts[k]), int(ends[k])
         saturated = values[first] <= sensor.low or values[first] >= sensor.high
         moved = np.ptp(simulated[at[first : last + 1]]) if last > first else 0.0
-        if last - first < FEWEST_STUCK or saturated or moved < STUCK_LEVELS * problem.levels[name]:
+        if last - first < FEWEST_STUCK or saturated or moved < STUCK_LEVELS * problem.levels()[name]:
             continue
         start, end = float(each.time[at[first]]), float(each.time[at[last]])
         sentence = f"{name} is stuck from {start:.4g} to {end:.4g} s"

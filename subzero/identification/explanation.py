@@ -61,6 +61,8 @@ KNOWN: tuple[tuple[float, float, str], ...] = (
     (10.055, 0.0, "kPa for metres of sea water"),
     (60.0, 0.0, "per minute for per second"),
     (1.0 / 60.0, 0.0, "per second for per minute"),
+    (30.0 / math.pi, 0.0, "revolutions per minute for rad/s"),
+    (math.pi / 30.0, 0.0, "rad/s for revolutions per minute"),
 )
 """Errors of a logger that people make: factor, offset in turns, words. Each is a peak of the prior."""
 KNOWN_ANGLES: tuple[tuple[float, float, str], ...] = (

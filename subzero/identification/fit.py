@@ -51,22 +51,33 @@ class Levels:
     sizes: Mapping[str, float]
 
 
-def usual_levels(problem: Problem) -> Levels:
-    """Return the levels before any fit."""
+def usual_levels(problem: Problem, terms: Terms) -> Levels:
+    """Return the levels of an explanation before any fit."""
     return Levels(
-        {name: each.prior.usual() for name, each in problem.channels.items()},
+        {name: problem.prior(name, terms).usual() for name in problem.channels},
         {unknown.name: 1.0 for unknown in problem.model.unknown},
     )
 
 
-def quieter(problem: Problem, levels: Levels) -> Levels:
+def quieter(problem: Problem, terms: Terms, levels: Levels) -> Levels:
     """Return levels with no more noise than usual."""
-    usual = usual_levels(problem).noise
+    usual = usual_levels(problem, terms).noise
     noise = {
         name: replace(each, white=min(each.white, usual[name].white), slow=min(each.slow, usual[name].slow))
         for name, each in levels.noise.items()
     }
     return replace(levels, noise=noise)
+
+
+def levels_under(problem: Problem, terms: Terms, linear: Linear) -> Levels:
+    """Return the levels of a point for another explanation, which may undo other units."""
+    before, after = problem.levels(linear.terms), problem.levels(terms)
+    noise = {
+        name: replace(each, white=each.white * ratio, slow=each.slow * ratio)
+        for name, each in linear.levels.noise.items()
+        for ratio in [after[name] / before[name]]
+    }
+    return replace(linear.levels, noise=noise)
 
 
 class Products:
@@ -79,7 +90,7 @@ class Products:
         self, problem: Problem, terms: Terms, e: Mapping[str, np.ndarray], J: Mapping[str, np.ndarray]
     ) -> None:
         self._parts: dict[tuple[str, Noise], tuple[np.ndarray, float]] = {}
-        self._resolutions = {name: each.prior.resolution for name, each in problem.channels.items()}
+        self._resolutions = {name: problem.prior(name, terms).resolution for name in e}
         self._blocks = {name: _blocks(problem, name, terms, J[name], e[name]) for name in e}
         self._size = next(iter(J.values())).shape[1] + 1
 
@@ -187,9 +198,9 @@ def unexplained(problem: Problem, linear: Linear) -> float:
     return float(np.sqrt(left / sum(int(problem.used(name, linear.terms).sum()) for name in linear.e)))
 
 
-def log_levels(problem: Problem, levels: Levels) -> float:
+def log_levels(problem: Problem, terms: Terms, levels: Levels) -> float:
     """Return the log prior density of noise and sizes, up to a constant."""
-    noise = sum(problem.channels[name].prior.log_density(each) for name, each in levels.noise.items())
+    noise = sum(problem.prior(name, terms).log_density(each) for name, each in levels.noise.items())
     sizes = sum(
         -0.5 * (np.log(levels.sizes[unknown.name]) / SIZE_SPREAD) ** 2 for unknown in problem.model.unknown
     )
@@ -225,7 +236,7 @@ class Linear:
         """Return the best step (n,), the log evidence with everything that is not linear, and the factor."""
         products = Products(problem, self.terms, self.e, self.J).total(self.levels.noise)
         step, evidence, factor = solve(products, self.entries, self.levels, self.off)
-        more = problem.log_jacobian(self.terms) + log_levels(problem, self.levels)
+        more = problem.log_jacobian(self.terms) + log_levels(problem, self.terms, self.levels)
         return step, evidence + more, factor
 
 
@@ -252,7 +263,7 @@ def _best_size(problem: Problem, linear: Linear, products: Products, levels: Lev
 
     def negative(log: float) -> float:
         there = at(log)
-        return -solve(total, linear.entries, there, off)[1] - log_levels(problem, there)
+        return -solve(total, linear.entries, there, off)[1] - log_levels(problem, linear.terms, there)
 
     found = minimize_scalar(negative, bounds=SIZE_RANGE, method="bounded", options={"xatol": 0.05})
     return at(float(found.x))
@@ -260,7 +271,7 @@ def _best_size(problem: Problem, linear: Linear, products: Products, levels: Lev
 
 def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Levels, name: str) -> Levels:
     """Return levels with the noise of a channel that has the highest evidence, given those of all others."""
-    before, prior = levels.noise[name], problem.channels[name].prior
+    before, prior = levels.noise[name], problem.prior(name, linear.terms)
     times, columns = given_others(problem, linear, products, levels, name)
 
     def at(log: np.ndarray) -> Noise:
@@ -304,7 +315,7 @@ def given_others(
     z = cho_solve((factor, True), sd * (b + A @ linear.off))
     K = solve_triangular(factor, (J * sd).T, lower=True).T
     U, s, _ = np.linalg.svd(K, full_matrices=False)
-    kept = s > INVISIBLE * problem.levels[name]
+    kept = s > INVISIBLE * problem.levels(linear.terms)[name]
     e0 = e + J @ (linear.off - sd * z)
     return problem.channels[name].time[used], np.ascontiguousarray(
         np.column_stack([U[:, kept] * s[kept], e0])
@@ -394,7 +405,8 @@ def _is_linear(problem: Problem, origin: Linear, there: Linear) -> bool:
         change = origin.J[name] @ (there.x - origin.x)
         left = origin.e[name] - change - e
         for _, times, both in _blocks(problem, name, there.terms, change[:, None], left):
-            filtered = Filter.of(there.levels.noise[name], problem.channels[name].prior.resolution, times)
+            resolution = problem.prior(name, there.terms).resolution
+            filtered = Filter.of(there.levels.noise[name], resolution, times)
             squares = np.sum(filtered.whiten(both) ** 2, axis=0)
             moved, missed = moved + float(np.sum(squares[:-1])), missed + float(squares[-1])
     return missed < max(2.0 * ENOUGH, SLOPE_ERROR**2 * moved)
@@ -410,7 +422,7 @@ def free_fit(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> Fi
     entries = free.entries(terms)
     known = {entry.identity: value for entry, value in start.items() if entry.kind != "unknown"}
     x = np.clip(np.array([known.get(entry.identity, entry.centre) for entry in entries]), *bounds(entries))
-    linear = origin = linearised(free, terms, entries, x, usual_levels(free))
+    linear = origin = linearised(free, terms, entries, x, usual_levels(free, terms))
     for _ in range(ROUNDS):
         before = _left(free, linear)
         noise = {
@@ -502,10 +514,11 @@ def _negative_log_posterior(problem: Problem, linear: Linear) -> float:
     """Return −log of the posterior density at a point, up to constants."""
     total = -problem.log_jacobian(linear.terms)
     for name, e in linear.e.items():
-        each = problem.channels[name]
+        resolution = problem.prior(name, linear.terms).resolution
         for _, times, columns in _blocks(problem, name, linear.terms, np.empty((e.size, 0)), e):
-            filtered = Filter.of(linear.levels.noise[name], each.prior.resolution, times)
-            total += 0.5 * float(np.sum(filtered.whiten(columns) ** 2))
+            filtered = Filter.of(linear.levels.noise[name], resolution, times)
+            with np.errstate(over="ignore"):  # a simulation that grows beyond all bounds has no probability
+                total += 0.5 * float(np.sum(filtered.whiten(columns) ** 2))
     return total + 0.5 * float(np.sum((linear.off / spreads(linear.entries, linear.levels)) ** 2))
 
 
@@ -516,7 +529,10 @@ def _laplace(problem: Problem, linear: Linear) -> tuple[float, np.ndarray]:
     factor = solve(products, linear.entries, linear.levels, linear.off)[2]
     log_det = float(np.sum(np.log(np.diag(factor[0]))))
     evidence = (
-        -_negative_log_posterior(problem, linear) - log_det - products[3] + log_levels(problem, linear.levels)
+        -_negative_log_posterior(problem, linear)
+        - log_det
+        - products[3]
+        + log_levels(problem, linear.terms, linear.levels)
     )
     return evidence, sd**2 * np.diag(cho_solve(factor, np.eye(sd.size)))
 

@@ -145,7 +145,7 @@ Fold = tuple[Sequence[Record], Sequence[Record], float]
 
 def _predicted(problem: Problem, best: Fit, terms: Terms, folds: Sequence[Fold]) -> list[np.ndarray]:
     """Return squared residuals of predictions, in levels of the sensors: one row of time for each channel of a fold."""
-    squares, levels = [], problem.levels_with(best.terms)
+    squares, levels = [], problem.levels(best.terms)
     for fitted_records, predicted_records, begin in folds:
         here = tuple(replace(term, record=-1) for term in terms)
         learned = free_fit(Problem(problem.model, fitted_records), here, _shared(best))

@@ -104,13 +104,13 @@ def nearness(problem: Problem, fitted: Fit, free: Fit) -> Nearness:
 
 def left_by(problem: Problem, fitted: Fit, free: Fit) -> list[Left]:
     """Return what an explanation leaves of every channel."""
-    levels = problem.levels_with(fitted.terms)
+    levels = problem.levels(fitted.terms)
     return [
         Left(
             name,
             problem.model.channels[name].unit,
             levels[name],
-            levels[name] * float(np.exp(problem.channels[name].prior.spread)),
+            levels[name] * float(np.exp(problem.prior(name).spread)),
             rms(free.linear.e[name][used]),
             rms(fitted.linear.e[name][used]),
         )

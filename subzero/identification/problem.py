@@ -127,7 +127,9 @@ class Problem:
         steps = np.diff(time)
         spread = OPEN_SPREAD if sensor.noise is None else sensor.spread
         prior = NoisePrior(level, step, float(np.median(steps[steps > 0.0])), spread)
-        far = SPIKE * float(np.hypot(level, step / np.sqrt(12.0)))
+        # In a wrong unit readings are rougher than the sensor says.
+        rough = max(level, level_of(values, step))
+        far = SPIKE * float(np.hypot(rough, step / np.sqrt(12.0)))
         away = self._wrapped(name, values - self._at_nominal(name, having))
         aside = np.isfinite(values) & (~inside | spikes(values, far, sensor.turn) | spikes_at_ends(away, far))
         used = finite & ~aside
@@ -147,24 +149,28 @@ class Problem:
             found.append(shown)
         return np.concatenate(found)
 
-    @cached_property
-    def levels(self) -> dict[str, float]:
-        """Channel → level of its sensor with its rounding. [unit]"""
-        return {
-            name: float(np.hypot(each.prior.level, each.prior.resolution / np.sqrt(12.0)))
-            for name, each in self.channels.items()
-        } | {CLOCK: 1.0}
-
-    def levels_with(self, terms: Terms) -> dict[str, float]:
-        """Return levels of the sensors under an explanation: one that was read off readings of a wrong unit is in that
+    def prior(self, name: str, terms: Terms = ()) -> NoisePrior:
+        """Return what is known of a sensor under an explanation: what was read off readings of a wrong unit is in that
         unit, and goes with them.
         """
-        found = dict(self.levels)
-        for term in terms:
-            of_record = term.target in self.channels and self.model.channels[term.target].noise is None
-            if term.slot[0] == AFFINE and of_record and not np.isfinite(term.begins):
-                found[term.target] /= abs(term.factor)
-        return found
+        prior, sensor = self.channels[name].prior, self.model.channels[name]
+        wrong = [t for t in terms if t.target == name and t.slot[0] == AFFINE and not np.isfinite(t.begins)]
+        if not wrong:
+            return prior
+        factor = abs(wrong[0].factor)
+        return replace(
+            prior,
+            level=prior.level / (factor if sensor.noise is None else 1.0),
+            resolution=prior.resolution / (factor if sensor.resolution is None else 1.0),
+        )
+
+    def levels(self, terms: Terms = ()) -> dict[str, float]:
+        """Return channel → level of its sensor with its rounding under an explanation. [unit]"""
+        priors = {name: self.prior(name, terms) for name in self.channels}
+        return {
+            name: float(np.hypot(each.level, each.resolution / np.sqrt(12.0)))
+            for name, each in priors.items()
+        } | {CLOCK: 1.0}
 
     def outliers(self, terms: Terms, e: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Return channel → which readings (m,) are outliers of an explanation: their residuals are alone far from those
@@ -176,7 +182,7 @@ class Problem:
             terms: the explanation.
             e: channel → its residuals (m,).
         """
-        levels, found = self.levels_with(terms), {}
+        levels, found = self.levels(terms), {}
         for name, each in self.channels.items():
             far = SPIKE * levels[name]
             alone = spikes(np.where(self.used(name, terms), e[name], np.nan), far, 0.0)
@@ -216,7 +222,7 @@ class Problem:
 
     def entries(self, terms: Terms) -> list[Entry]:
         """Return all free numbers of an explanation: of the model, its terms, starts and unknown inputs."""
-        own = entries_of(terms, self.model, self.levels, self.intervals)
+        own = entries_of(terms, self.model, self.levels(terms), self.intervals)
         starts = [
             Entry("start", number.name, number.nominal, number.tolerance, k, number.low, number.high)
             for k in range(len(self.records))
@@ -340,7 +346,7 @@ class Problem:
             each = self.channels[term.target]
             count = int((self._where(each, term) & each.used).sum())
             if term.kind == "stuck":
-                total -= (count - 1) * np.log(max(each.prior.resolution, self.levels[term.target] * STEP))
+                total -= (count - 1) * np.log(max(each.prior.resolution, self.levels()[term.target] * STEP))
             else:
                 total -= count * np.log(abs(term.factor))
         return float(total)

@@ -20,6 +20,7 @@ from subzero.identification.fit import (
     can_begin,
     fit,
     fitted_levels,
+    levels_under,
     linearised,
     quieter,
     usual_levels,
@@ -92,7 +93,7 @@ class Search:
 
     def run(self) -> None:
         """Search until no move gains."""
-        problem, levels = self.problem, usual_levels(self.problem)
+        problem, levels = self.problem, usual_levels(self.problem, ())
         entries = problem.entries(())
         nominal = linearised(
             problem, (), entries, np.array([entry.centre for entry in entries]), levels, must=True
@@ -208,11 +209,11 @@ class Search:
         words = " + ".join(term.id for term in terms) or "nothing is wrong"
         self.progress(min(0.9, 0.05 + 0.02 * len(self.fits)), f"fit of {words}")
         values: dict[Entry, float] = dict(zip(start.entries, start.x.tolist(), strict=True))
-        fitted = fit(self.problem, terms, values, start.levels)
+        fitted = fit(self.problem, terms, values, levels_under(self.problem, terms, start))
         if self.score(fitted) < expected - WORTH:
             own = {entry: value for entry, value in values.items() if entry.kind not in OF_MODEL}
             if can_begin(self.problem, terms, own):
-                again = fit(self.problem, terms, own, usual_levels(self.problem))
+                again = fit(self.problem, terms, own, usual_levels(self.problem, terms))
                 fitted = max(fitted, again, key=self.score)
         if name not in self.fits or fitted.log_evidence > self.fits[name].log_evidence:
             self.fits[name] = fitted
@@ -254,7 +255,7 @@ class Search:
         """Yield the best, ranked with the noise of the explanation that they are added to, and ranked with usual noise,
         from which their own is then sought: what a term would explain may be part of the former.
         """
-        calm = [replace(each, levels=quieter(self.problem, each.levels)) for _, each in ranked]
+        calm = [replace(each, levels=quieter(self.problem, each.terms, each.levels)) for _, each in ranked]
         quiet = sorted(((self._linear_score(each), each) for each in calm), key=lambda pair: -pair[0])
         for order in (ranked, quiet):
             yield from (linear for _, linear in self._distinct(order)[:RANKED_AGAIN])
@@ -305,7 +306,8 @@ class Search:
             J[name][:, old] = before[:, [known[entries[i].identity][1] for i in old]]
             if fresh:
                 J[name][:, fresh] = own[name]
-        return Linear(terms, entries, x, {name: e[:, 0] for name, e in found.items()}, J, base.levels)
+        levels = levels_under(problem, terms, base)
+        return Linear(terms, entries, x, {name: e[:, 0] for name, e in found.items()}, J, levels)
 
 
 def _begin(entry: Entry, term: Term | None) -> float:

@@ -1,0 +1,89 @@
+"""Readings that jump: a motor, whose current follows each step of the voltage at once.
+
+Verifies: outliers at jumps, which no rule for readings alone can see, are set aside and invent no cause or error in the
+data; a true delay, which also shows at jumps alone, is still named; a channel without a declared noise is named with
+its wrong unit, whether its readings are then smaller or larger; revolutions per minute are told from ten times. Truth
+is exact: the motor is linear of the first order. Tolerance: none, 3 standard deviations for numbers.
+"""
+
+import numpy as np
+import pytest
+
+import subzero.diagnosis as sd
+
+STEP, NOISE = 0.1, {"speed": 0.2, "current": 0.05}
+RESISTANCE, TORQUE, FRICTION = 2.0, 0.5, 0.02
+
+
+def motor(p, u, t):
+    """J ω' = K i − b ω,  i = (V − K ω)/R: exact for a voltage that is held."""
+    decay = (p["torque"] ** 2 / p["resistance"] + FRICTION) / p["inertia"]
+    keep, speed, shown = np.exp(-decay * (t[1] - t[0])), np.zeros_like(p["inertia"]), []
+    for volt in u["volt"]:
+        shown.append((speed, (volt - p["torque"] * speed) / p["resistance"]))
+        steady = p["torque"] / p["resistance"] * volt / (p["inertia"] * decay)
+        speed = steady + (speed - steady) * keep
+    speeds, currents = np.moveaxis(np.array(shown), 1, 0)
+    return {"speed": speeds, "current": currents}
+
+
+def model(noise=True):
+    return sd.Model(
+        motor,
+        channels={
+            "speed": sd.Sensor(noise=NOISE["speed"] if noise else None, unit="rad/s"),
+            "current": sd.Sensor(noise=NOISE["current"] if noise else None, unit="A"),
+        },
+        inputs=["volt"],
+        parameters=[
+            sd.Number("resistance", RESISTANCE, tolerance=0.04),
+            sd.Number("torque", TORQUE, tolerance=0.01),
+            sd.Number("inertia", 0.05, tolerance=0.002),
+        ],
+        causes=[
+            sd.Cause("resistance", "the winding has another resistance", changes={"resistance": 0.6}),
+            sd.Cause("inertia", "the load has another inertia", changes={"inertia": 0.02}),
+        ],
+        unknown=[sd.Unknown("command:volt", size=0.02, time=1.0)],
+        batch=True,
+    )
+
+
+def record(*, seed=0, outliers=0, samples=300, delay=0.0, **factors):
+    """Return a record of the nominal motor, with outliers at the first samples behind jumps of the voltage."""
+    rng = np.random.default_rng(seed)
+    volt = np.repeat(rng.choice([-12.0, -6.0, 6.0, 12.0], samples // 20), 20)
+    time = STEP * np.arange(samples)
+    numbers = {"resistance": RESISTANCE, "torque": TORQUE, "inertia": np.full(1, 0.05)}
+    shown = motor(numbers, {"volt": volt[:, None]}, time)
+    columns = {}
+    for name, values in shown.items():
+        late = np.interp(time - delay, time, values[:, 0]) if name == "current" else values[:, 0]
+        columns[name] = (late + NOISE[name] * rng.standard_normal(samples)) * factors.get(name, 1.0)
+    jumps = np.flatnonzero(np.diff(volt)) + 1
+    columns["current"][rng.choice(jumps, outliers, replace=False)] += 20.0 * NOISE["current"]
+    return sd.Record(time, {**columns, "volt": volt})
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_outliers_at_jumps_are_no_delay(seed):
+    verdict = sd.diagnose(record(seed=seed, outliers=2), model())
+    assert verdict.verdict == "nothing_wrong"
+    assert any(note.startswith("current: 2 readings are set aside") for note in verdict.notes)
+
+
+def test_a_delay_that_shows_at_jumps_alone_is_named():
+    (named,) = sd.diagnose(record(delay=0.04), model()).named
+    (delay,) = named.estimates
+    assert named.id == "delay:current"
+    assert delay.value == pytest.approx(0.04, abs=3.0 * delay.sd)
+
+
+@pytest.mark.parametrize("factor", [0.001, 0.1, 30.0 / np.pi, 1000.0])
+@pytest.mark.parametrize("noise", [True, False])
+def test_a_wrong_unit_is_named_whether_the_noise_is_declared_or_not(noise, factor):
+    verdict = sd.diagnose(record(speed=factor), model(noise))
+    (named,) = verdict.named
+    assert named.id == "unit:speed"
+    assert named.estimates[0].value == pytest.approx(factor)
+    assert not any("speed" in note and "aside" in note for note in verdict.notes)
