@@ -354,23 +354,16 @@ class Fit:
         return dict(zip(self.entries, self.x.tolist(), strict=True))
 
 
-def fit(problem: Problem, terms: Terms, start: Mapping[Entry, float], levels: Levels) -> Fit:
-    """Return the fit of an explanation.
-
-    Args:
-        problem: records and model.
-        terms: the explanation.
-        start: where it begins, of entries that are known there; others begin at the means of their priors.
-        levels: noise and sizes at the beginning.
+def fit(problem: Problem, start: Linear) -> Fit:
+    """Return the fit of an explanation from where it is linearised; sensitivities are computed anew where those of the
+    start do not hold.
     """
-    entries, x = _beginning(problem, terms, start)
-    linear = origin = _approached(problem, linearised(problem, terms, entries, x, levels))
+    linear = origin = _approached(problem, start)
     best, score, lasting = linear, -np.inf, 0
     for _ in range(ROUNDS):
-        moved = _stepped(problem, replace(linear, levels=fitted_levels(problem, linear)))
-        linear = moved
-        if not _is_linear(problem, origin, moved):
-            linear = origin = linearised(problem, terms, entries, moved.x, moved.levels)
+        linear = _stepped(problem, replace(linear, levels=fitted_levels(problem, linear)))
+        if not _is_linear(problem, origin, linear):
+            linear = origin = linearised(problem, linear.terms, linear.entries, linear.x, linear.levels)
         now = _laplace(problem, linear)[0]
         lasting = 0 if now > score + ENOUGH else lasting + 1
         if now > score:
@@ -380,20 +373,17 @@ def fit(problem: Problem, terms: Terms, start: Mapping[Entry, float], levels: Le
     return _finished(problem, best)
 
 
-def can_begin(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> bool:
-    """Return whether the model can be simulated where a fit would begin."""
-    entries, x = _beginning(problem, terms, start)
-    return bool(problem.residuals(terms, entries, [x])[1][0])
-
-
-def _beginning(
-    problem: Problem, terms: Terms, start: Mapping[Entry, float]
-) -> tuple[list[Entry], np.ndarray]:
-    """Return the free numbers of an explanation, and where its fit begins (n,)."""
+def begun(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> Linear | None:
+    """Return an explanation linearised where some of its numbers are known, all others at the means of their priors,
+    with usual noise; None if it cannot be simulated there.
+    """
     entries = problem.entries(terms)
     known = {entry.identity: value for entry, value in start.items()}
     x = np.array([known.get(entry.identity, entry.centre) for entry in entries])
-    return entries, np.clip(x, *bounds(entries))
+    x = np.clip(x, *bounds(entries))
+    if not problem.residuals(terms, entries, [x])[1][0]:
+        return None
+    return linearised(problem, terms, entries, x, usual_levels(problem, terms))
 
 
 def _is_linear(problem: Problem, origin: Linear, there: Linear) -> bool:

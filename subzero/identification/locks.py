@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -68,22 +69,13 @@ class Locks:
 
 def locks(problem: Problem, best: Fit, held_out: Sequence[Record]) -> dict[str, Locks]:
     """Return the locks of every term of the best explanation: id → locks."""
-    having: dict[str, list[np.ndarray]] = {}
-    return {
-        term.id: _locks(problem, best, term, held_out, having)
-        for term in best.terms
-        if term.kind != "tolerances"
-    }
+    terms, split = [term for term in best.terms if term.kind != "tolerances"], _split(problem, held_out)
+    tried = [term for term in terms if not _begins_too_late(term, split)]
+    gains = _gains(problem, best, tried, _folds(problem, held_out, split)) if tried else {}
+    return {term.id: _locks(problem, term, gains.get(term.id)) for term in terms}
 
 
-def _locks(
-    problem: Problem,
-    best: Fit,
-    term: Term,
-    held_out: Sequence[Record],
-    having: dict[str, list[np.ndarray]],
-) -> Locks:
-    gain = held_out_gain(problem, best, term, held_out, having)
+def _locks(problem: Problem, term: Term, gain: Gain | None) -> Locks:
     reasons = [f"{name} may as well act late or early" for name in _late_commands(problem, term)]
     if gain is not None and not gain.holds:
         reasons.append(
@@ -101,59 +93,68 @@ def _late_commands(problem: Problem, term: Term) -> list[str]:
     return [name.removeprefix(COMMAND) for name in names if name.startswith(COMMAND)]
 
 
-def held_out_gain(
-    problem: Problem,
-    best: Fit,
-    term: Term,
-    held_out: Sequence[Record],
-    having: dict[str, list[np.ndarray]],
-) -> Gain | None:
-    """Return the gain of a term in free simulation of what was not fitted; None if that cannot be tried.
-
-    Of several records each is predicted by a fit of the others; of a single one the last part by a fit of the first.
-    What is predicted with all terms is kept in `having`.
+class Fold(NamedTuple):
+    """Records that are fitted, records that are predicted, the time from which predictions count [s], and what these
+    are: records that were held out, if it is strict.
     """
+
+    fitted: Problem
+    predicted: Problem
+    begin: float
+    what: str
+    strict: bool = False
+
+
+def _split(problem: Problem, held_out: Sequence[Record]) -> float:
+    """Return the time at which a single record is divided; −∞ if whole records are predicted. [s]"""
+    time = problem.records[0].time
+    whole = held_out or len(problem.records) > 1
+    return -math.inf if whole else float(time[0] + FITTED_SHARE * np.ptp(time))
+
+
+def _begins_too_late(term: Term, split: float) -> bool:
+    """Return whether a fit of the first part of a record says nothing about a term."""
+    late = term.begins > split or term.kind == "stuck" or (term.kind == "cause" and term.begins > -math.inf)
+    return split > -math.inf and late
+
+
+def _folds(problem: Problem, held_out: Sequence[Record], split: float) -> list[Fold]:
+    """Return what is predicted: records that were held out; of several records each by a fit of the others; of a single
+    one the last part by a fit of the first.
+    """
+    records, model = problem.records, problem.model
     if held_out:
-        folds = [(list(problem.records), list(held_out), -math.inf)]
-        what = "the records that were held out"
-    elif len(problem.records) > 1:
-        folds = [
-            (problem.records[:k] + problem.records[k + 1 :], [record], -math.inf)
-            for k, record in enumerate(problem.records)
-        ]
-        what = "each record by a fit of the others"
-    else:
-        (record,) = problem.records
-        split = float(record.time[0] + FITTED_SHARE * np.ptp(record.time))
-        if (
-            (math.isfinite(term.begins) and term.kind == "cause")
-            or term.begins > split
-            or term.kind == "stuck"
-        ):
-            return None
-        folds = [([record.between(-math.inf, split)], [record], split)]
-        what = "the last part of the record by a fit of the first"
-    if what not in having:
-        having[what] = _predicted(problem, best, best.terms, folds)
-    lacking = _predicted(problem, best, without(best.terms, term), folds)
-    return _gain(having[what], lacking, what, strict=bool(held_out))
+        there = Problem(model, held_out)
+        return [Fold(problem, there, split, "the records that were held out", strict=True)]
+    if split > -math.inf:
+        first = Problem(model, [records[0].between(-math.inf, split)])
+        return [Fold(first, problem, split, "the last part of the record by a fit of the first")]
+    parts = [
+        (Problem(model, records[:k] + records[k + 1 :]), Problem(model, [r])) for k, r in enumerate(records)
+    ]
+    return [Fold(*part, split, "each record by a fit of the others") for part in parts]
 
 
-Fold = tuple[Sequence[Record], Sequence[Record], float]
-"""Records that are fitted, records that are predicted, the time from which predictions count."""
+def _gains(problem: Problem, best: Fit, tried: Sequence[Term], folds: Sequence[Fold]) -> dict[str, Gain]:
+    """Return the gain of terms in free simulation of what was not fitted: id → gain."""
+    having = _predicted(problem, best, best.terms, folds)
+    return {
+        term.id: _gain(having, _predicted(problem, best, without(best.terms, term), folds), folds[0])
+        for term in tried
+    }
 
 
 def _predicted(problem: Problem, best: Fit, terms: Terms, folds: Sequence[Fold]) -> list[np.ndarray]:
     """Return squared residuals of predictions, in levels of the sensors: one row of time for each channel of a fold."""
     squares, levels = [], problem.levels(best.terms)
-    for fitted_records, predicted_records, begin in folds:
+    for fold in folds:
         here = tuple(replace(term, record=-1) for term in terms)
-        learned = free_fit(Problem(problem.model, fitted_records), here, _shared(best))
+        learned = free_fit(fold.fitted, here, _shared(best))
         fixed = {entry.identity: value for entry, value in learned.values.items() if entry.record < 0}
-        there = Problem(problem.model, predicted_records, fixed)
-        predicted = free_fit(there, here, learned.values if begin > -math.inf else {})
+        there = fold.predicted.with_fixed(fixed)
+        predicted = free_fit(there, here, learned.values if fold.begin > -math.inf else {})
         for name, e in predicted.linear.e.items():
-            kept = there.used(name, here) & (there.channels[name].time > begin)
+            kept = there.used(name, here) & (there.channels[name].time > fold.begin)
             if name in levels and kept.any():
                 squares.append((e[kept] / levels[name]) ** 2)
     return squares
@@ -164,7 +165,7 @@ def _shared(best: Fit) -> dict[Entry, float]:
     return {entry: value for entry, value in best.values.items() if entry.record < 0}
 
 
-def _gain(having: Sequence[np.ndarray], lacking: Sequence[np.ndarray], what: str, *, strict: bool) -> Gain:
+def _gain(having: Sequence[np.ndarray], lacking: Sequence[np.ndarray], fold: Fold) -> Gain:
     """Return the gain between squared residuals with and without a term, with its bootstrap interval."""
     better = np.concatenate([b - a for a, b in zip(having, lacking, strict=True)])
     blocks = np.array([np.mean(part) for part in np.array_split(better, min(BLOCKS, better.size))])
@@ -174,7 +175,7 @@ def _gain(having: Sequence[np.ndarray], lacking: Sequence[np.ndarray], what: str
     if not np.isfinite(blocks).all():
         low = high = _sign(having, lacking)
     before, after = (float(np.sqrt(np.mean(np.concatenate(rows)))) for rows in (lacking, having))
-    return Gain(before, after, low, high, what, strict)
+    return Gain(before, after, low, high, fold.what, fold.strict)
 
 
 def _sign(having: Sequence[np.ndarray], lacking: Sequence[np.ndarray]) -> float:

@@ -372,7 +372,8 @@ class Problem:
         *,
         must: bool = False,
     ) -> dict[str, np.ndarray]:
-        """Return channel → −∂e/∂x (m, n) at x, of some entries or of all; 0 where neither side can be simulated.
+        """Return channel → −∂e/∂x (m, n) at x, of some entries or of all; 0 where neither side can be simulated, and of
+        numbers that are fixed.
 
         Args:
             terms: of the explanation.
@@ -381,7 +382,9 @@ class Problem:
             wanted: places of some entries.
             must: whether a model that cannot be simulated a small step away is refused.
         """
-        places = np.arange(len(entries)) if wanted is None else np.asarray(wanted, dtype=int)
+        asked = range(len(entries)) if wanted is None else wanted
+        free = np.array([entries[i].identity not in self.fixed for i in asked], dtype=bool)
+        places = np.asarray(asked, dtype=int)[free]
         steps = self.steps(entries, x)[places]
         columns, valid = self._columns(terms, entries, x, places, steps, must=must)
         if not valid.all():
@@ -389,7 +392,10 @@ class Problem:
             again, _ = self._columns(terms, entries, x, places[~valid], steps[~valid], must=False)
             for name, column in again.items():
                 columns[name][:, ~valid] = np.nan_to_num(column)
-        return columns
+        found = {name: np.zeros((column.shape[0], free.size)) for name, column in columns.items()}
+        for name, column in columns.items():
+            found[name][:, free] = column
+        return found
 
     def _columns(
         self,

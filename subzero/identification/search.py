@@ -17,7 +17,7 @@ from subzero.identification.explanation import AFFINE, Entry, Term, Terms, log_p
 from subzero.identification.fit import (
     Fit,
     Linear,
-    can_begin,
+    begun,
     fit,
     fitted_levels,
     levels_under,
@@ -98,9 +98,9 @@ class Search:
         nominal = linearised(
             problem, (), entries, np.array([entry.centre for entry in entries]), levels, must=True
         )
-        self._fit((), nominal)
+        self._fit(nominal)
         for linear in self._greedy(nominal)[-1:]:
-            self._fit(linear.terms, linear)
+            self._fit(linear)
         while (base := self._next()) is not None:
             if len(self.fits) >= MOST_FITS:
                 self.complete = False
@@ -138,12 +138,13 @@ class Search:
         self._expanded[ids(base.terms)] = self.score(base)
         self._fit_additions(base.linear)
         for term in base.terms:
-            if term not in gross:
-                self._fit_additions(self._fit(without(base.terms, term), base.linear).linear)
+            bare = self.there(base.linear, without(base.terms, term))
+            if bare and term not in gross:
+                self._fit_additions(self._fit(bare).linear)
             for twin in self._twins(term):
                 linear = self.there(base.linear, with_term(without(base.terms, term), twin))
                 if linear and self._own_score(linear) > self.score(base) - GROSS:
-                    self._fit(linear.terms, base.linear)
+                    self._fit(linear)
 
     def _is_gross(self, base: Fit, term: Term) -> bool:
         """Return whether a term is an error in the data without which the linear problem is far less probable."""
@@ -164,11 +165,7 @@ class Search:
         made = [self.there(bare, with_term(bare.terms, each)) for each in (*units, *other)]
         found = [self._with_own_noise(linear) for linear in made if linear]
         ranked = self._distinct(sorted(found, key=lambda pair: -pair[0]))[:REPLACED]
-        return [
-            self._fit(linear.terms, linear, score)
-            for score, linear in ranked
-            if score > self.score(base) - GROSS
-        ]
+        return [self._fit(linear, score) for score, linear in ranked if score > self.score(base) - GROSS]
 
     def _fit_additions(self, base: Linear) -> None:
         """Fit the best explanations with one term more, except those that are ranked far below the best of all fits.
@@ -178,7 +175,7 @@ class Search:
         here = self._linear_score(base)
         for score, linear in self._best_additions(base)[:FITTED]:
             if score > max(here - WORTH, self.score(self.ranked()[0]) - WITHIN):
-                self._fit(linear.terms, linear, score)
+                self._fit(linear, score)
 
     def _twins(self, term: Term) -> Iterator[Term]:
         """Yield the same error, undone, of other channels of its unit: two gauges differ, and either may be wrong."""
@@ -198,23 +195,22 @@ class Search:
                     size=-term.size,
                 )
 
-    def _fit(self, terms: Terms, start: Linear, expected: float = -np.inf) -> Fit:
+    def _fit(self, start: Linear, expected: float = -np.inf) -> Fit:
         """Return the fit of an explanation from a start; also from the nominal model, if it is much less probable than
         expected of the linear problem: what another explanation moved may bar the way there.
         """
-        name = key(terms)
+        name = key(start.terms)
         if name in self._tried:
             return self.fits[name]
         self._tried.add(name)
-        words = " + ".join(term.id for term in terms) or "nothing is wrong"
+        words = " + ".join(term.id for term in start.terms) or "nothing is wrong"
         self.progress(min(0.9, 0.05 + 0.02 * len(self.fits)), f"fit of {words}")
-        values: dict[Entry, float] = dict(zip(start.entries, start.x.tolist(), strict=True))
-        fitted = fit(self.problem, terms, values, levels_under(self.problem, terms, start))
+        fitted = fit(self.problem, start)
         if self.score(fitted) < expected - WORTH:
-            own = {entry: value for entry, value in values.items() if entry.kind not in OF_MODEL}
-            if can_begin(self.problem, terms, own):
-                again = fit(self.problem, terms, own, usual_levels(self.problem, terms))
-                fitted = max(fitted, again, key=self.score)
+            values = zip(start.entries, start.x.tolist(), strict=True)
+            own = {entry: value for entry, value in values if entry.kind not in OF_MODEL}
+            if nominal := begun(self.problem, start.terms, own):
+                fitted = max(fitted, fit(self.problem, nominal), key=self.score)
         if name not in self.fits or fitted.log_evidence > self.fits[name].log_evidence:
             self.fits[name] = fitted
         return self.fits[name]
