@@ -337,19 +337,25 @@ class Problem:
 
     def log_jacobian(self, terms: Terms) -> float:
         """Return log |∂(record as it should be)/∂(record)|, which makes evidences of corrected records comparable; and
-        of stuck readings the log density: each is equal to the one before.
+        how much less probable it is that readings are equal in a row by chance than as they are stuck.
         """
         total = 0.0
         for term in terms:
             if not term.is_data_error or term.target not in self.channels:
                 continue
             each = self.channels[term.target]
-            count = int((self._where(each, term) & each.used).sum())
             if term.kind == "stuck":
-                total -= (count - 1) * np.log(max(each.prior.resolution, self.levels()[term.target] * STEP))
+                total -= self._log_equal(each, term)
             else:
-                total -= count * np.log(abs(term.factor))
+                total -= int((self._where(each, term) & each.used).sum()) * np.log(abs(term.factor))
         return float(total)
+
+    def _log_equal(self, each: Readings, term: Term) -> float:
+        """Return the log probability that readings of a time are equal, as neighbours are in the rest of the record."""
+        at = self._where(each, term)
+        inside, equal = at[1:] & at[:-1], np.diff(each.values) == 0.0
+        rest = (equal[~inside].sum() + 1.0) / ((~inside).sum() + 2.0)
+        return float(equal[inside].sum() * np.log(rest))
 
     def used(self, name: str, terms: Terms) -> np.ndarray:
         """Return which readings of a channel an explanation uses (m,)."""

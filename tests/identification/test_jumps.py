@@ -3,7 +3,7 @@
 Verifies: outliers at jumps, which no rule for readings alone can see, are set aside and invent no cause or error in the
 data; a true delay, which also shows at jumps alone, is still named; a channel without a declared noise is named with
 its wrong unit, whether its readings are then smaller or larger; revolutions per minute are told from ten times. Truth
-is exact: the motor is linear of the first order. Tolerance: none, 3 standard deviations for numbers.
+is exact: the motor is linear of the first order. Stuck readings are named by their equality. Tolerance: none, 3 standard deviations for numbers.
 """
 
 import numpy as np
@@ -87,3 +87,12 @@ def test_a_wrong_unit_is_named_whether_the_noise_is_declared_or_not(noise, facto
     assert named.id == "unit:speed"
     assert named.estimates[0].value == pytest.approx(factor)
     assert not any("speed" in note and "aside" in note for note in verdict.notes)
+
+
+def test_stuck_readings_are_named_where_the_middle_one_is_right():
+    """Of equal readings in a row only the middle one is used: here it agrees with the simulation."""
+    made = record()
+    columns = dict(made.columns)
+    columns["speed"] = np.where(abs(np.arange(300) - 150) <= 40, columns["speed"][150], columns["speed"])
+    (named,) = sd.diagnose(sd.Record(made.time, columns), model()).named
+    assert named.id == "stuck:speed@0"
