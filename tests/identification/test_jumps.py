@@ -2,8 +2,9 @@
 
 Verifies: outliers at jumps, which no rule for readings alone can see, are set aside and invent no cause or error in the
 data; a true delay, which also shows at jumps alone, is still named; a channel without a declared noise is named with
-its wrong unit, whether its readings are then smaller or larger; revolutions per minute are told from ten times. Truth
-is exact: the motor is linear of the first order. Stuck readings are named by their equality. Tolerance: none, 3 standard deviations for numbers.
+its wrong unit, whether its readings are then smaller or larger; revolutions per minute are told from ten times; stuck
+readings are named by their equality. Truth is exact: the motor is linear of the first order. Tolerance: none, 3
+standard deviations for numbers.
 """
 
 import numpy as np
