@@ -50,6 +50,7 @@ def declared(problem: Problem) -> list[Term]:
     model = problem.model
     duration = max(float(np.ptp(record.time)) for record in problem.records)
     data = [term for term in data_terms(model) if term.target in (*problem.channels, CLOCK)]
+    data = [term for term in data if term.kind != "unit" or problem.may_read(term.target, term.factor)]
     own_clock = {name for record in problem.records for name in record.times}
     data = [
         replace(term, odds=SAME_CLOCK * term.odds)

@@ -25,6 +25,8 @@ SPIKE = 5.0
 """A reading so many levels off the middle of those next to it, which agree with one another, is set aside. [-]"""
 RARE = 0.05
 """Largest share of a channel's readings that are set aside as outliers: more of them say something. [-]"""
+FREE_TURNS = 2.0
+"""So many turns readings of an angle may span besides twice the turns of the nominal model: its logger wraps it. [-]"""
 MAX_KNOTS = 200
 """Most knots of one unknown input in one record: its time is lengthened where there would be more."""
 FIXED = 1e-6
@@ -171,6 +173,17 @@ class Problem:
             name: float(np.hypot(each.level, each.resolution / np.sqrt(12.0)))
             for name, each in priors.items()
         } | {CLOCK: 1.0}
+
+    def may_read(self, name: str, factor: float) -> bool:
+        """Return whether readings of a channel may be a factor too large. Those of an angle may not, if it would then turn
+        more often than the nominal model: wrapped, they would agree with any simulation.
+        """
+        turn, each = self.model.channels[name].turn, self.channels[name]
+        if not turn or abs(factor) == 1.0:
+            return True
+        having = [(k, record) for k, record in enumerate(self.records) if name in record.columns]
+        most = FREE_TURNS * turn + 2.0 * float(np.ptp(self._at_nominal(name, having)))
+        return not float(np.ptp(each.values[each.used])) > most * abs(factor)
 
     def outliers(self, terms: Terms, e: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Return channel → which readings (m,) are outliers of an explanation: their residuals are alone far from those

@@ -69,3 +69,22 @@ def test_the_page_goes_through_and_nothing_is_near(tmp_path):
     assert not (tmp_path / "my_vehicle.toml").exists()
     assert json.loads((tmp_path / "my_vehicle.json").read_text())["verdict"] == "nothing_near"
     assert json.loads((tmp_path / "found" / "diagnosis.json").read_text())["verdict"] == "nothing_near"
+
+
+@pytest.mark.slow
+def test_a_log_of_whose_channels_some_would_be_left_without_samples_is_diagnosed(tmp_path):
+    """The clock that is tried for its time of start would put all samples of a channel before the trial."""
+    shutil.copy(LOG.with_name("dive.csv"), tmp_path)
+    for words in (
+        ["import", "dive.csv", "--out", "flown.csv", "--trial", "trial.toml"],
+        ["diagnose", "trial.toml", "flown.csv", "--out", "found"],
+    ):
+        done = subprocess.run(
+            [sys.executable, "-m", "subzero", *words],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr[-2000:]
+    assert json.loads((tmp_path / "found" / "diagnosis.json").read_text())["verdict"] == "nothing_near"

@@ -97,3 +97,30 @@ def test_stuck_readings_are_named_where_the_middle_one_is_right():
     columns["speed"] = np.where(abs(np.arange(300) - 150) <= 40, columns["speed"][150], columns["speed"])
     (named,) = sd.diagnose(sd.Record(made.time, columns), model()).named
     assert named.id == "stuck:speed@0"
+
+
+def compass(p, u, t):
+    """The heading is the sum of commanded rates, and of a drift that is off by default. [deg]"""
+    rates = u["rate"] + p["drift"]["rate"]
+    return {"heading": p["start"] + np.cumsum(rates, axis=0) * (t[1] - t[0])}
+
+
+@pytest.mark.parametrize("factor, drift", [(1.0, 5.0), (np.pi / 180.0, 0.0)])
+def test_a_compass_without_a_declared_noise_is_not_multiplied_until_it_agrees(factor, drift):
+    """A thousand times a heading, wrapped, is within the noise of any simulation, if the noise goes with the unit."""
+    made = sd.Model(
+        compass,
+        channels={"heading": sd.Sensor(unit="deg", angle=True)},
+        inputs=["rate"],
+        parameters=[sd.Start("start", 0.0, tolerance=5.0)],
+        causes=[sd.Cause("drift", "it turns", rate=sd.Number(0.0, scale=10.0), off={"rate": 0.0})],
+        unknown=[sd.Unknown("command:rate", size=0.1, time=5.0)],
+        batch=True,
+    )
+    rng, time = np.random.default_rng(1), 0.2 * np.arange(300)
+    rate = np.repeat(rng.choice([-10.0, 0.0, 10.0], 15), 20)
+    heading = compass({"start": 2.0, "drift": {"rate": drift}}, {"rate": rate}, time)["heading"]
+    shown = factor * ((heading + 0.5 * rng.standard_normal(300)) % 360.0)
+    (named,) = sd.diagnose(sd.Record(time, {"heading": shown, "rate": rate}), made).named
+    assert named.id == ("drift" if drift else "unit:heading")
+    assert named.estimates[0].value == pytest.approx(drift or factor, rel=0.02)

@@ -432,6 +432,8 @@ def _log_density(
 def _posed_like(search: Search, records: Sequence[Logged], errors: Errors, kept: Samples) -> Problem:
     """Return the problem of some samples of records without errors, with the noise estimated at the best fit."""
     new = posed_again(search.problem, without(records, errors))
+    if len(new.entries) != len(search.problem.entries):
+        raise UserError("A channel has no sample within the trial.")  # and the catalogue no errors of it
     pairs = enumerate(zip(search.problem.records, new.records, strict=True))
     made = [_similar(old, seen, kept[i], places_of(records[i], errors, i)) for i, (old, seen) in pairs]
     return replace(new, records=tuple(made))
