@@ -175,8 +175,8 @@ class Problem:
         } | {CLOCK: 1.0}
 
     def may_read(self, name: str, factor: float) -> bool:
-        """Return whether readings of a channel may be a factor too large. Those of an angle may not, if it would then turn
-        more often than the nominal model: wrapped, they would agree with any simulation.
+        """Return whether readings of a channel may be a factor too large. Those of an angle may not, if it would then
+        turn more often than the nominal model: wrapped, they would agree with any simulation.
         """
         turn, each = self.model.channels[name].turn, self.channels[name]
         if not turn or abs(factor) == 1.0:
