@@ -17,8 +17,9 @@ from subzero.identification.noise import OPEN_SPREAD, NoisePrior, level_of, midd
 from subzero.identification.record import Record
 from subzero.identification.simulation import Asked, Runs
 
-STEP = 0.1
-"""Step of a sensitivity, over the standard deviation of a number's prior. [-]"""
+STEP, STEP_DELAY = 0.1, 1e-3
+"""Step of a sensitivity, over the standard deviation of a number's prior; of a delay in sampling intervals: a simulation
+is interpolated between samples, and a longer step would pass a corner. [-]"""
 FEWEST_SAMPLES = 8
 """A channel with fewer readings in all records is not used."""
 SPIKE = 5.0
@@ -378,9 +379,14 @@ class Problem:
 
     def steps(self, entries: Sequence[Entry], x: np.ndarray) -> np.ndarray:
         """Return the step of the sensitivity to each entry (n,), to the side that its bounds leave."""
-        sd = np.array([entry.sd for entry in entries])
+        step = np.array(
+            [
+                STEP_DELAY * self.intervals[entry.name] if entry.kind == "delay" else STEP * entry.sd
+                for entry in entries
+            ]
+        )
         high = np.array([entry.high for entry in entries])
-        return np.where(x + STEP * sd <= high, STEP * sd, -STEP * sd)
+        return np.where(x + step <= high, step, -step)
 
     def jacobian(
         self,
