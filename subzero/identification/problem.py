@@ -18,8 +18,8 @@ from subzero.identification.record import Record
 from subzero.identification.simulation import Asked, Runs
 
 STEP, STEP_DELAY = 0.1, 1e-3
-"""Step of a sensitivity, over the standard deviation of a number's prior; of a delay in sampling intervals: a simulation
-is interpolated between samples, and a longer step would pass a corner. [-]"""
+"""Step of a sensitivity, over the standard deviation of a number's prior; of a delay in sampling intervals, where a
+longer step would pass a corner of the simulation, which is interpolated between samples. [-]"""
 FEWEST_SAMPLES = 8
 """A channel with fewer readings in all records is not used."""
 SPIKE = 5.0

@@ -9,6 +9,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 import subzero.diagnosis as sd
+from subzero.identification.explanation import data_terms
 from subzero.identification.fit import Levels, Products, fit, given_others, linearised, solve
 from subzero.identification.noise import (
     Filter,
@@ -20,6 +21,7 @@ from subzero.identification.noise import (
     resolution_of,
 )
 from subzero.identification.problem import Problem, spikes, spikes_at_ends
+from tests.identification.oscillator import STEP, model, record
 
 
 def line(p, u, t):
@@ -243,3 +245,18 @@ def test_a_fit_begins_where_it_is_told_and_ends_at_the_maximum(problem):
         fit(problem, linearised(problem, (), entries, at * sd_of, levels)).log_evidence for at in (0.0, 3.0)
     ]
     assert abs(ends[0] - ends[1]) < 0.1
+
+
+def test_the_slope_of_a_delay_is_that_between_two_samples():
+    """x(t − d) is interpolated: ∂x/∂d = −(x_k − x_{k−1})/h, up to the corner at the next sample."""
+    made = record(0)
+    problem = Problem(model(), [made])
+    (late,) = [term for term in data_terms(problem.model) if term.kind == "delay"]
+    entries = problem.entries((late,))
+    (place,) = [i for i, entry in enumerate(entries) if entry.kind == "delay"]
+    x = np.array([entry.centre for entry in entries])
+    here, _ = problem.residuals((late,), entries, [x])
+    shown = made.columns["x"] - here["x"][:, 0]
+    x[place] = 0.99 * STEP
+    slope = problem.jacobian((late,), entries, x, [place])["x"][1:, 0]
+    np.testing.assert_allclose(slope, -np.diff(shown) / STEP, atol=1e-9)

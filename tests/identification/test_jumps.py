@@ -73,11 +73,14 @@ def test_outliers_at_jumps_are_no_delay(seed):
     assert any(note.startswith("current: 2 readings are set aside") for note in verdict.notes)
 
 
-def test_a_delay_that_shows_at_jumps_alone_is_named():
-    (named,) = sd.diagnose(record(delay=0.04), model()).named
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("late", [0.04, 0.7])
+def test_a_delay_that_shows_at_jumps_alone_is_named(late, seed):
+    """Also one of whole samples, where the slope of an interpolated simulation has a corner."""
+    (named,) = sd.diagnose(record(delay=late, seed=seed), model()).named
     (delay,) = named.estimates
     assert named.id == "delay:current"
-    assert delay.value == pytest.approx(0.04, abs=3.0 * delay.sd)
+    assert delay.value == pytest.approx(late, abs=3.0 * delay.sd)
 
 
 @pytest.mark.parametrize("factor", [0.001, 0.1, 30.0 / np.pi, 1000.0])
