@@ -303,12 +303,10 @@ def given_others(
     factor = np.linalg.cholesky(H)
     z = cho_solve((factor, True), sd * (b + A @ linear.off))
     K = solve_triangular(factor, (J * sd).T, lower=True).T
-    U, s, _ = np.linalg.svd(K, full_matrices=False)
-    kept = s > INVISIBLE * problem.levels[name]
+    squares, V = np.linalg.eigh(K.T @ K)
+    kept = squares > (INVISIBLE * problem.levels[name]) ** 2
     e0 = e + J @ (linear.off - sd * z)
-    return problem.channels[name].time[used], np.ascontiguousarray(
-        np.column_stack([U[:, kept] * s[kept], e0])
-    )
+    return problem.channels[name].time[used], np.column_stack([K @ V[:, kept], e0])
 
 
 @dataclass(frozen=True, eq=False)
