@@ -173,20 +173,6 @@ def _within(
     return z
 
 
-def unexplained(problem: Problem, linear: Linear) -> float:
-    """Return what priors and noise do not explain of the residuals at a point: root mean square of e, whitened by
-    Σ + J D Jᵀ. 1 is expected.
-    """
-    products = Products(problem, linear.terms, linear.e, linear.J).total(linear.levels.noise)
-    sd = spreads(linear.entries, linear.levels)
-    step, *_ = solve(products, linear.entries, linear.levels, linear.off)
-    A, b, ee, _ = products
-    left = (
-        ee - 2.0 * float(step @ b) + float(step @ A @ step) + float(np.sum(((linear.off + step) / sd) ** 2))
-    )
-    return float(np.sqrt(left / sum(int(problem.used(name, linear.terms).sum()) for name in linear.e)))
-
-
 def log_levels(problem: Problem, levels: Levels) -> float:
     """Return the log prior density of noise and sizes, up to a constant."""
     noise = sum(problem.channels[name].prior.log_density(each) for name, each in levels.noise.items())
