@@ -31,9 +31,9 @@ MOST_TERMS = 8
 RANKED_AGAIN, FITTED = 10, 6
 """So many of the best are ranked again with their own noise; at most so many of these are fitted."""
 WITHIN = 5.0
-"""Explanations within this of the best are expanded, too; an error in the data that gains more is a gross one. [nats]"""
-WORTH = 3.0
-"""A term that is ranked to lose more is not fitted. [nats]"""
+"""Explanations within this of the best are expanded, too. [nats]"""
+WORTH, GROSS = 3.0, 100.0
+"""A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one. [nats]"""
 OF_MODEL = ("number", "start", "unknown")
 """Kinds of entries that every explanation has."""
 TWINS = ("offset", "scale", "affine", "delay")
@@ -140,15 +140,15 @@ class Search:
                 self._fit_additions(self._fit(bare).linear)
             for twin in self._twins(term):
                 linear = self.there(base.linear, with_term(without(base.terms, term), twin))
-                if linear and self._own_score(linear) > self.score(base) - WITHIN:
+                if linear and self._own_score(linear) > self.score(base) - GROSS:
                     self._fit(linear)
 
     def _is_gross(self, base: Fit, term: Term) -> bool:
-        """Return whether a term is an error in the data without which the linear problem would not be expanded."""
+        """Return whether a term is an error in the data without which the linear problem is far less probable."""
         if not term.is_data_error:
             return False
         bare = self.there(base.linear, without(base.terms, term))
-        return bare is not None and self._own_score(bare) < self.score(base) - WITHIN
+        return bare is not None and self._own_score(bare) < self.score(base) - GROSS
 
     def _replacements(self, base: Fit, term: Term) -> list[Fit]:
         """Return the fits of the best explanations with another unit, or a regression, of a channel in the place of a
@@ -220,7 +220,7 @@ class Search:
         errors = [term for term in self._terms if term.kind in ("unit", "affine")]
         while len(here.terms) < MOST_TERMS:
             added = self._additions(here, errors)
-            if not added or added[0][0] < before + WITHIN:
+            if not added or added[0][0] < before + GROSS:
                 break
             before, here = added[0]
         return here
