@@ -184,20 +184,6 @@ def _within(
     return z
 
 
-def unexplained(problem: Problem, linear: Linear) -> float:
-    """Return what priors and noise do not explain of the residuals at a point: root mean square of e, whitened by
-    Σ + J D Jᵀ. 1 is expected.
-    """
-    products = Products(problem, linear.terms, linear.e, linear.J).total(linear.levels.noise)
-    sd = spreads(linear.entries, linear.levels)
-    step, *_ = solve(products, linear.entries, linear.levels, linear.off)
-    A, b, ee, _ = products
-    left = (
-        ee - 2.0 * float(step @ b) + float(step @ A @ step) + float(np.sum(((linear.off + step) / sd) ** 2))
-    )
-    return float(np.sqrt(left / sum(int(problem.used(name, linear.terms).sum()) for name in linear.e)))
-
-
 def log_levels(problem: Problem, terms: Terms, levels: Levels) -> float:
     """Return the log prior density of noise and sizes, up to a constant."""
     noise = sum(problem.prior(name, terms).log_density(each) for name, each in levels.noise.items())
@@ -314,12 +300,10 @@ def given_others(
     factor = np.linalg.cholesky(H)
     z = cho_solve((factor, True), sd * (b + A @ linear.off))
     K = solve_triangular(factor, (J * sd).T, lower=True).T
-    U, s, _ = np.linalg.svd(K, full_matrices=False)
-    kept = s > INVISIBLE * problem.levels(linear.terms)[name]
+    squares, V = np.linalg.eigh(K.T @ K)
+    kept = squares > (INVISIBLE * problem.levels(linear.terms)[name]) ** 2
     e0 = e + J @ (linear.off - sd * z)
-    return problem.channels[name].time[used], np.ascontiguousarray(
-        np.column_stack([U[:, kept] * s[kept], e0])
-    )
+    return problem.channels[name].time[used], np.column_stack([K @ V[:, kept], e0])
 
 
 @dataclass(frozen=True, eq=False)

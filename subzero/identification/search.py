@@ -29,9 +29,8 @@ from subzero.identification.problem import Problem, Progress
 
 MOST_TERMS = 8
 """An explanation has no more terms."""
-RANKED_AGAIN, FITTED, REPLACED = 10, 6, 3
-"""So many of the best are ranked again with their own noise; at most so many of these are fitted; and of errors of one
-channel in the place of a gross one."""
+RANKED_AGAIN, FITTED = 10, 6
+"""So many of the best are ranked again with their own noise; at most so many of these are fitted."""
 WITHIN = 5.0
 """Explanations within this of the best are expanded, too. [nats]"""
 WORTH, GROSS = 3.0, 100.0
@@ -99,8 +98,7 @@ class Search:
             problem, (), entries, np.array([entry.centre for entry in entries]), levels, must=True
         )
         self._fit(nominal)
-        for linear in self._greedy(nominal)[-1:]:
-            self._fit(linear)
+        self._fit(self._greedy(nominal))
         while (base := self._next()) is not None:
             if len(self.fits) >= MOST_FITS:
                 self.complete = False
@@ -164,8 +162,8 @@ class Search:
         other = [each for each in suggested(self.problem, bare, units) if each.kind == "affine"]
         made = [self.there(bare, with_term(bare.terms, each)) for each in (*units, *other)]
         found = [self._with_own_noise(linear) for linear in made if linear]
-        ranked = self._distinct(sorted(found, key=lambda pair: -pair[0]))[:REPLACED]
-        return [self._fit(linear, score) for score, linear in ranked if score > self.score(base) - GROSS]
+        ranked = self._distinct(sorted(found, key=lambda pair: -pair[0]))[:FITTED]
+        return [self._fit(linear, score) for score, linear in ranked if score > self.score(base) - WITHIN]
 
     def _fit_additions(self, base: Linear) -> None:
         """Fit the best explanations with one term more, except those that are ranked far below the best of all fits.
@@ -215,20 +213,18 @@ class Search:
             self.fits[name] = fitted
         return self.fits[name]
 
-    def _greedy(self, nominal: Linear) -> list[Linear]:
-        """Return explanations, each with the gross error in the data more that gains most in the linear problem at the
-        nominal model.
+    def _greedy(self, nominal: Linear) -> Linear:
+        """Return the nominal model with the units and regressions that gain most in the linear problem, one after the
+        other, as long as each is a gross error.
         """
-        chain: list[Linear] = []
         here, before = nominal, self._linear_score(nominal)
-        errors = [term for term in self._terms if term.is_data_error]
+        errors = [term for term in self._terms if term.kind in ("unit", "affine")]
         while len(here.terms) < MOST_TERMS:
             added = self._additions(here, errors)
             if not added or added[0][0] < before + GROSS:
                 break
             before, here = added[0]
-            chain.append(here)
-        return chain
+        return here
 
     def _linear_score(self, linear: Linear) -> float:
         return linear.evidence(self.problem)[1] + log_prior(linear.terms, self._loggers)
