@@ -26,6 +26,9 @@ NEAR_SIZE = 3.0
 NEAR_BEND = 4.0
 """Farthest that a parameter which is not named may be from its nominal value, in tolerances. [-]"""
 
+SOFT_KINDS = ("offset", "scale", "drift")
+"""Kinds of errors in the data that an error of a model looks like."""
+
 
 @dataclass(frozen=True)
 class Left:
@@ -99,7 +102,19 @@ def nearness(problem: Problem, fitted: Fit, free: Fit) -> Nearness:
         for name, bend in bends.items()
         if bend > NEAR_BEND
     ]
+    if _errs_everywhere(problem, fitted):
+        reasons.append(
+            "every sensor has to be off (by an offset, a scale or a drift): none agrees with the model"
+        )
     return Nearness(tuple(left), sizes, bends, tuple(reasons))
+
+
+def _errs_everywhere(problem: Problem, fitted: Fit) -> bool:
+    """Return whether an explanation leaves none of several sensors as it is: then no reading bears witness to the
+    model, and an error of the model looks the same.
+    """
+    soft = {term.target for term in fitted.terms if term.kind in SOFT_KINDS}
+    return len(problem.channels) > 1 and soft >= set(problem.channels)
 
 
 def left_by(problem: Problem, fitted: Fit, free: Fit) -> list[Left]:

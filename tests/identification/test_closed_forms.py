@@ -260,3 +260,23 @@ def test_the_slope_of_a_delay_is_that_between_two_samples():
     x[place] = 0.99 * STEP
     slope = problem.jacobian((late,), entries, x, [place])["x"][1:, 0]
     np.testing.assert_allclose(slope, -np.diff(shown) / STEP, atol=1e-9)
+
+
+@pytest.mark.parametrize("third", [False, True])
+def test_errors_of_every_sensor_are_an_error_of_the_model(third):
+    """Two sensors that both drift name nothing; with a third one that agrees with the model they are named."""
+    factors = {"left": 1.0, "right": 2.0, **({"third": 3.0} if third else {})}
+    made = sd.Model(
+        lambda p, u, t: {name: factor * p["size"] * np.sin(t) for name, factor in factors.items()},
+        channels={name: sd.Sensor(noise=0.05, unit="m") for name in factors},
+        parameters=[sd.Number("size", 1.0, tolerance=0.01)],
+    )
+    rng, time = np.random.default_rng(0), 0.1 * np.arange(200)
+    drifts = {"left": 1.0, "right": -1.5, "third": 0.0}
+    columns = {
+        name: factor * np.sin(time) + drifts[name] * (time / 20.0 - 0.5) + 0.05 * rng.standard_normal(200)
+        for name, factor in factors.items()
+    }
+    verdict = sd.diagnose(sd.Record(time, columns), made)
+    assert verdict.verdict == ("data_error" if third else "nothing_near")
+    assert {each.id.partition(":")[2] for each in verdict.named} == ({"left", "right"} if third else set())
