@@ -89,6 +89,7 @@ def diagnose(
     seed: int = 0,
     budget: str = "full",
     held_out: identification.Record | Sequence[identification.Record] = (),
+    seconds: float | None = None,
 ) -> Verdict | identification.Verdict:
     """Say what a simulation gets wrong, name the cause, extend the model and measure the gain.
 
@@ -107,13 +108,14 @@ def diagnose(
         seed: of all random numbers.
         budget: "full", "verdict" without gain and next trial, or "screen" for the screening alone, in a few seconds.
         held_out: records of a model of your own that no fit sees.
+        seconds: of processor time, after which the search for a model of your own is ended. [s]
 
     Raises:
         UserError: a record, a sidecar or an effects file cannot be used.
         scenarios.ScenarioError: the scenario cannot be used.
     """
     if isinstance(model, identification.Model):
-        return _of_own_model(records, model, held_out, progress)
+        return _of_own_model(records, model, held_out, seconds, progress)
     own = load(effects) if isinstance(effects, str | Path) else tuple(effects)
     logged = _logged([records] if isinstance(records, Given) else records, model, commands)
     return diagnose_trials(logged, effects=own, progress=progress, seed=seed, budget=budget)
@@ -123,6 +125,7 @@ def _of_own_model(
     records: Given | Sequence[Given],
     model: identification.Model,
     held_out: identification.Record | Sequence[identification.Record],
+    seconds: float | None,
     progress: Progress | None,
 ) -> identification.Verdict:
     """Diagnose a model of the user's own."""
@@ -132,7 +135,7 @@ def _of_own_model(
         raise UserError(
             "records of a model of your own are subzero.diagnosis.Record: read them by subzero.diagnosis.read."
         )
-    return identification.diagnose(own, model, held_out=held_out, progress=progress)
+    return identification.diagnose(own, model, held_out=held_out, seconds=seconds, progress=progress)
 
 
 def _logged(records: Sequence[Given], model: str | Path | Model | None, commands: str | None) -> list[Logged]:

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from time import process_time
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
 from subzero.arguments import checked_arguments
+from subzero.errors import UserError
 from subzero.identification.candidates import declared
 from subzero.identification.explanation import AFFINE, Entry, Term, kinds_of, with_term, without
 from subzero.identification.fit import Fit, Linear, free_fit, spreads
@@ -52,6 +54,7 @@ def diagnose(
     model: Model,
     *,
     held_out: Record | Sequence[Record] = (),
+    seconds: float | None = None,
     progress: Progress | None = None,
 ) -> Verdict:
     """Say what a model gets wrong in records, and whether it is near them at all.
@@ -64,32 +67,39 @@ def diagnose(
         model: the function and its declarations.
         held_out: records that no fit sees, for the gain of a term. Without them each of several records is
             predicted by a fit of the others, or the last part of a single one by a fit of the first.
+        seconds: of processor time, after which the search is ended; the verdict is of what was found by then, and
+            says so; no limit if not given. [s]
         progress: called with the share that is done, and the present step.
 
     Raises:
-        UserError: a record cannot be used.
+        UserError: a record cannot be used, or there is no time.
         ModelError: the model cannot be used.
     """
+    if seconds is not None and not seconds > 0.0:
+        raise UserError(f"diagnose: seconds is {seconds!r}; it must be greater than 0.")
+    end = math.inf if seconds is None else process_time() + seconds
     report = progress or (lambda share, words: None)
     given = [records] if isinstance(records, Record) else list(records)
     kept = [held_out] if isinstance(held_out, Record) else list(held_out)
     with threadpool_limits(limits=1, user_api="blas"):  # matrices are small
-        search, outliers = _searched(model, given, report)
+        search, outliers = _searched(model, given, report, end)
         report(0.9, "locks")
         return _concluded(search, kept, outliers)
 
 
-def _searched(model: Model, records: Sequence[Record], report: Progress) -> tuple[Search, dict[str, int]]:
-    """Return the search, made again where its best explanation shows outliers that could not be seen before; and
-    channel → how many.
+def _searched(
+    model: Model, records: Sequence[Record], report: Progress, end: float
+) -> tuple[Search, dict[str, int]]:
+    """Return the search, made again where its best explanation shows outliers that could not be seen before, until some
+    processor time [s]; and channel → how many.
     """
     count: dict[str, int] = {}
     for last in range(PASSES):
-        search = Search(Problem(model, records), report)
+        search = Search(Problem(model, records), report, end - process_time())
         search.run()
         best = search.ranked()[0]
         outliers = search.problem.outliers(best.terms, best.linear.e)
-        if not outliers or last == PASSES - 1:
+        if not (outliers and search.complete) or last == PASSES - 1:
             break
         records = search.problem.without(outliers)
         count |= {name: count.get(name, 0) + int(found.sum()) for name, found in outliers.items()}
@@ -379,7 +389,7 @@ def _notes(problem: Problem, search: Search, outliers: Mapping[str, int]) -> tup
             found.append(f"{name}: the noise of its sensor, {each.prior.level:.2g}, was read off the record.")
     if not search.complete:
         found.append(
-            "The search was ended after its largest number of fits; there may be better explanations."
+            "The search was ended by its time or its number of fits; there may be better explanations."
         )
     return tuple(found)
 

@@ -7,8 +7,10 @@ in its place is judged where the fit with it ends.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from time import process_time
 
 import numpy as np
 
@@ -58,6 +60,10 @@ def ids(terms: Terms) -> tuple[str, ...]:
     return tuple(term.id for term in terms)
 
 
+class _TimeOverError(Exception):
+    """A search has had its time."""
+
+
 @dataclass(eq=False)
 class Search:
     """A search.
@@ -65,16 +71,19 @@ class Search:
     Attributes:
         problem: records and model.
         progress: called before every fit.
+        seconds: of processor time, after which no fit begins. [s]
         fits: explanation → its best fit.
         complete: whether it came to its end.
     """
 
     problem: Problem
     progress: Progress
+    seconds: float = math.inf
     fits: dict[Key, Fit] = field(default_factory=dict)
     complete: bool = True
 
     def __post_init__(self) -> None:
+        self._end = process_time() + self.seconds
         self._expanded: dict[tuple[str, ...], float] = {}
         self._left: set[Key] = set()
         self._tried: set[Key] = set()
@@ -91,7 +100,13 @@ class Search:
         return sorted(self.fits.values(), key=self.score, reverse=True)
 
     def run(self) -> None:
-        """Search until no move gains."""
+        """Search until no move gains, or the time is over."""
+        try:
+            self._run()
+        except _TimeOverError:
+            self.complete = False
+
+    def _run(self) -> None:
         problem, levels = self.problem, usual_levels(self.problem, ())
         entries = problem.entries(())
         nominal = linearised(
@@ -200,6 +215,8 @@ class Search:
         name = key(start.terms)
         if name in self._tried:
             return self.fits[name]
+        if self.fits and process_time() > self._end:
+            raise _TimeOverError
         self._tried.add(name)
         words = " + ".join(term.id for term in start.terms) or "nothing is wrong"
         self.progress(min(0.9, 0.05 + 0.02 * len(self.fits)), f"fit of {words}")

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import subzero.diagnosis as sd
+from subzero.errors import UserError
 
 STEP, NOISE = 0.1, {"speed": 0.2, "current": 0.05}
 RESISTANCE, TORQUE, FRICTION = 2.0, 0.5, 0.02
@@ -127,3 +128,11 @@ def test_a_compass_without_a_declared_noise_is_not_multiplied_until_it_agrees(fa
     (named,) = sd.diagnose(sd.Record(time, {"heading": shown, "rate": rate}), made).named
     assert named.id == ("drift" if drift else "unit:heading")
     assert named.estimates[0].value == pytest.approx(drift or factor, rel=0.02)
+
+
+def test_a_search_is_ended_by_its_time_and_says_so():
+    verdict = sd.diagnose(record(speed=30.0 / np.pi), model(), seconds=1e-6)
+    assert not verdict.complete
+    assert any("ended" in note for note in verdict.notes)
+    with pytest.raises(UserError, match="seconds is 0"):
+        sd.diagnose(record(), model(), seconds=0)
