@@ -30,6 +30,9 @@ TIME_SPREAD = 1.0
 FLOOR_SHARE = 1e-6
 """Least level of a sensor whose noise was neither declared nor is seen, over the spread of its readings. [-]"""
 
+MEDIAN_TO_SD = 1.4826
+"""Standard deviation of normal noise, over its median absolute deviation. [-]"""
+
 
 @dataclass(frozen=True)
 class Noise:
@@ -100,11 +103,10 @@ def level_of(values: np.ndarray, resolution: float) -> float:
     """Return the level of a sensor as its readings (n,) show it: from their second differences, which a slow signal
     hardly has; at least that of its rounding.
 
-    1.4826 makes a median absolute deviation a standard deviation; the second difference of white noise has √6 times
-    its own.
+    The second difference of white noise has √6 times its standard deviation.
     """
     seen = values[np.isfinite(values)]
-    rough = 1.4826 * float(np.median(np.abs(np.diff(seen, 2)))) / np.sqrt(6.0) if seen.size > 4 else 0.0
+    rough = MEDIAN_TO_SD * float(np.median(np.abs(np.diff(seen, 2)))) / np.sqrt(6.0) if seen.size > 4 else 0.0
     floor = FLOOR_SHARE * float(np.ptp(seen)) if seen.size else 0.0
     return max(rough, resolution / np.sqrt(12.0), floor, np.finfo(float).tiny ** 0.25)
 

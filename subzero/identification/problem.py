@@ -13,7 +13,14 @@ import numpy as np
 from subzero.errors import UserError
 from subzero.identification.explanation import AFFINE, CLOCK, Entry, Term, Terms, entries_of
 from subzero.identification.model import Model
-from subzero.identification.noise import OPEN_SPREAD, NoisePrior, level_of, middle_of_equal, resolution_of
+from subzero.identification.noise import (
+    MEDIAN_TO_SD,
+    OPEN_SPREAD,
+    NoisePrior,
+    level_of,
+    middle_of_equal,
+    resolution_of,
+)
 from subzero.identification.record import Record
 from subzero.identification.simulation import Asked, Runs
 
@@ -198,8 +205,10 @@ class Problem:
         """
         levels, found = self.levels(terms), {}
         for name, each in self.channels.items():
-            far = SPIKE * levels[name]
-            alone = spikes(np.where(self.used(name, terms), e[name], np.nan), far, 0.0)
+            used = self.used(name, terms)
+            # Where an explanation leaves more than the sensor errs, that is its own error.
+            usual = max(levels[name], MEDIAN_TO_SD * float(np.median(np.abs(e[name][used]))))
+            alone = spikes(np.where(used, e[name], np.nan), SPIKE * usual, 0.0)
             if 0 < alone.sum() <= RARE * each.used.sum():
                 found[name] = alone
         return found

@@ -158,3 +158,12 @@ def test_a_verdict_is_text_json_and_a_picture(tmp_path):
     figure = verdict.plot()
     assert len(figure.axes) == 2
     plt.close(figure)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [88, 194])
+def test_what_is_left_of_a_structure_error_is_not_named(seed):
+    """A rounded drive leaves 1.5 levels of the sensor; a late one a damping that is off by a tenth of a per cent."""
+    from benchmarks.diagnosis.structure import run
+
+    assert run(seed)[3] == ()
