@@ -92,12 +92,13 @@ def diagnose(
 def _searched(
     model: Model, records: Sequence[Record], report: Progress, end: float
 ) -> tuple[Search, dict[str, int]]:
-    """Return the search, made again where its best explanation shows outliers that could not be seen before, until some
+    """Return the search, which goes on from its best explanation without the outliers that this shows, until some
     processor time [s]; and channel → how many.
     """
     count: dict[str, int] = {}
+    best: Fit | None = None
     for last in range(PASSES):
-        search = Search(Problem(model, records), report, end - process_time())
+        search = Search(Problem(model, records), report, end - process_time(), best)
         search.run()
         best = search.ranked()[0]
         outliers = search.problem.outliers(best.terms, best.linear.e)

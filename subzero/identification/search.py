@@ -72,6 +72,7 @@ class Search:
         problem: records and model.
         progress: called before every fit.
         seconds: of processor time, after which no fit begins. [s]
+        begin: a fit of other records of these, from whose explanation the search goes on.
         fits: explanation → its best fit.
         complete: whether it came to its end.
     """
@@ -79,6 +80,7 @@ class Search:
     problem: Problem
     progress: Progress
     seconds: float = math.inf
+    begin: Fit | None = None
     fits: dict[Key, Fit] = field(default_factory=dict)
     complete: bool = True
 
@@ -113,7 +115,10 @@ class Search:
             problem, (), entries, np.array([entry.centre for entry in entries]), levels, must=True
         )
         self._fit(nominal)
-        self._fit(self._greedy(nominal))
+        if (fitted := self.begin) is None:
+            self._fit(self._greedy(nominal))
+        else:
+            self._fit(linearised(problem, fitted.terms, fitted.entries, fitted.x, fitted.linear.levels))
         while (base := self._next()) is not None:
             if len(self.fits) >= MOST_FITS:
                 self.complete = False
