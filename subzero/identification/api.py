@@ -302,7 +302,7 @@ def _budget(search: Search, best: Fit, free: Fit) -> tuple[Share, ...]:
 
 
 def _levels_left(problem: Problem, linear: Linear, levels: Mapping[str, float]) -> float:
-    """Return what is left of all channels together, root mean square, in levels of their sensors."""
+    """Return the remainder of all channels together, root mean square, in levels of their sensors."""
     e = linear.e
     return rms(np.concatenate([e[name][problem.used(name, linear.terms)] / levels[name] for name in e]))
 

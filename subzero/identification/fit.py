@@ -357,7 +357,7 @@ def fit(problem: Problem, start: Linear) -> Fit:
     return _finished(problem, best)
 
 
-def begun(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> Linear | None:
+def starting_point(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> Linear | None:
     """Return an explanation linearised where some of its numbers are known, all others at the means of their priors,
     with usual noise; None if it cannot be simulated there.
     """

@@ -119,8 +119,8 @@ def _begins_too_late(term: Term, split: float) -> bool:
 
 
 def _folds(problem: Problem, held_out: Sequence[Record], split: float) -> list[Fold]:
-    """Return what is predicted: records that were held out; of several records each by a fit of the others; of a single
-    one the last part by a fit of the first.
+    """Return the predictions to make: of records that were held out; of several records each by a fit of the others; of
+    a single one the last part by a fit of the first.
     """
     records, model = problem.records, problem.model
     if held_out:

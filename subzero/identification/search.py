@@ -19,12 +19,12 @@ from subzero.identification.explanation import AFFINE, Entry, Term, Terms, log_p
 from subzero.identification.fit import (
     Fit,
     Linear,
-    begun,
     fit,
     fitted_levels,
     levels_under,
     linearised,
     quieter,
+    starting_point,
     usual_levels,
 )
 from subzero.identification.problem import Problem, Progress
@@ -229,7 +229,7 @@ class Search:
         if self.score(fitted) < expected - WORTH:
             values = zip(start.entries, start.x.tolist(), strict=True)
             own = {entry: value for entry, value in values if entry.kind not in OF_MODEL}
-            if nominal := begun(self.problem, start.terms, own):
+            if nominal := starting_point(self.problem, start.terms, own):
                 fitted = max(fitted, fit(self.problem, nominal), key=self.score)
         if name not in self.fits or fitted.log_evidence > self.fits[name].log_evidence:
             self.fits[name] = fitted

@@ -42,6 +42,6 @@ def _exchange(number: np.ndarray, operand: int) -> int:
 
 
 add = _add if numba.config.DISABLE_JIT else _intrinsic("add")
-"""(number (1,) of int64, what is added) → the number before."""
+"""(number (1,) of int64, the amount) → the number before."""
 exchange = _exchange if numba.config.DISABLE_JIT else _intrinsic("xchg")
 """(number (1,) of int64, another one) → the number before."""

@@ -21,7 +21,7 @@ class SteppingGroup:
     """Simulators of one trial, one model and one sample time.
 
     The thread that calls does not wait for the others to wake, which takes as long as some steps: it begins, and they
-    take what is left.
+    take the remaining ones.
 
     Args:
         simulators: none of them has stopped; nothing else steps them in the meantime.
