@@ -160,8 +160,8 @@ class Problem:
         return np.concatenate(found)
 
     def prior(self, name: str, terms: Terms = ()) -> NoisePrior:
-        """Return the prior knowledge of a sensor under an explanation: a level that was read off readings of a wrong unit
-        is in that unit, and goes with them.
+        """Return the prior knowledge of a sensor under an explanation: a level that was read off readings of a wrong
+        unit is in that unit, and goes with them.
         """
         prior, sensor = self.channels[name].prior, self.model.channels[name]
         wrong = [t for t in terms if t.target == name and t.slot[0] == AFFINE and not np.isfinite(t.begins)]
