@@ -8,6 +8,7 @@ Record, made_once                               numbers as one record in memory,
 scratch                                         a small array on the stack of a compiled function     stack
 compile_in_parallel, Call                       a second process compiles at the same time            parallel
 deferred_signals                                signals wait while code is compiled                   signals
+atomic.add, atomic.exchange                     whole numbers that threads change together            atomic
 -                                               compiled code kept for the next run                   machine_code
 """
 
