@@ -7,6 +7,8 @@ readings are named by their equality. Truth is exact: the motor is linear of the
 standard deviations for numbers.
 """
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from subzero.errors import UserError
 
 STEP, NOISE = 0.1, {"speed": 0.2, "current": 0.05}
 RESISTANCE, TORQUE, FRICTION = 2.0, 0.5, 0.02
+LONG = partial(pytest.param, marks=pytest.mark.long)
 
 
 def motor(p, u, t):
@@ -67,15 +70,15 @@ def record(*, seed=0, outliers=0, samples=300, delay=0.0, **factors):
     return sd.Record(time, {**columns, "volt": volt})
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", [0, LONG(1), LONG(2), LONG(3)])
 def test_outliers_at_jumps_are_no_delay(seed):
     verdict = sd.diagnose(record(seed=seed, outliers=2), model())
     assert verdict.verdict == "nothing_wrong"
     assert any(note.startswith("current: 2 readings are set aside") for note in verdict.notes)
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("late", [0.04, 0.7])
+@pytest.mark.parametrize("seed", [0, LONG(1), LONG(2)])
+@pytest.mark.parametrize("late", [0.04, LONG(0.7)])
 def test_a_delay_that_shows_at_jumps_alone_is_named(late, seed):
     """Also one of whole samples, where the slope of an interpolated simulation has a corner."""
     (named,) = sd.diagnose(record(delay=late, seed=seed), model()).named
@@ -84,7 +87,7 @@ def test_a_delay_that_shows_at_jumps_alone_is_named(late, seed):
     assert delay.value == pytest.approx(late, abs=3.0 * delay.sd)
 
 
-@pytest.mark.parametrize("factor", [0.001, 0.1, 30.0 / np.pi, 1000.0])
+@pytest.mark.parametrize("factor", [LONG(0.001), 0.1, 30.0 / np.pi, LONG(1000.0)])
 @pytest.mark.parametrize("noise", [True, False])
 def test_a_wrong_unit_is_named_whether_the_noise_is_declared_or_not(noise, factor):
     verdict = sd.diagnose(record(speed=factor), model(noise))
