@@ -44,8 +44,6 @@ SEEN_ODDS = 9.0
 """Odds from which on a term would be seen: of NAMED_PROBABILITY."""
 PASSES = 3
 """Most searches of a diagnosis, each without the outliers that the one before has shown."""
-OTHER = 2.0
-"""A number is surely other than without its term from so many standard deviations on."""
 RELATED = 3.0
 """Channels differ if all explanations say so, by so many standard deviations."""
 
@@ -174,19 +172,10 @@ def _kind(
 def _named(
     problem: Problem, best: Fit, term: Term, probability: float, lock: Locks | None, near: Nearness
 ) -> Named:
-    estimates = _estimates(problem, best, term)
     against = lock.reasons if lock else ("the model is not near",) if not near.near else ()
-    if near.near and estimates and not any(_is_other(problem, each) for each in estimates):
-        against = (*against, "its size may as well be 0")
     gain = lock.gain if lock else None
+    estimates = _estimates(problem, best, term)
     return Named(term.id, term.sentence, term.is_data_error, probability, estimates, gain, against)
-
-
-def _is_other(problem: Problem, estimate: Estimate) -> bool:
-    """Return whether a number is surely other than without its term, and a parameter by more than its tolerance."""
-    tolerances = {number.name: number.tolerance for number in problem.model.shared}
-    least = max(OTHER * estimate.sd, tolerances.get(estimate.name, 0.0))
-    return abs(estimate.value - estimate.nominal) > least and not estimate.name.endswith(".since")
 
 
 def _estimates(problem: Problem, best: Fit, term: Term) -> tuple[Estimate, ...]:

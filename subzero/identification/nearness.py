@@ -19,7 +19,7 @@ from subzero.identification.explanation import kinds_of
 from subzero.identification.fit import Fit
 from subzero.identification.problem import Problem
 
-NEAR_LEFT = 1.2
+NEAR_LEFT = 1.4
 """Largest ratio of the residual, after the unknown inputs, to the most that a sensor errs. [-]"""
 NEAR_SIZE = 3.0
 """Largest ratio of an unknown input's size to the declared one. [-]"""

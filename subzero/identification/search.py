@@ -37,6 +37,8 @@ WITHIN = 5.0
 """Explanations within this of the best are expanded, too. [nats]"""
 WORTH, GROSS = 3.0, 100.0
 """A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one. [nats]"""
+GROSS_KINDS = ("unit", "affine")
+"""Errors in the data that may be gross."""
 OF_MODEL = ("number", "start", "unknown")
 """Kinds of entries that every explanation has."""
 TWINS = ("offset", "scale", "affine", "delay")
@@ -158,15 +160,18 @@ class Search:
         for term in base.terms:
             bare = self.there(base.linear, without(base.terms, term))
             if bare and term not in gross:
-                self._fit_additions(self._fit(bare).linear)
+                # A fit that ended elsewhere may be far below what this one leaves when its term is dropped.
+                self._fit_additions(self._fit(bare, self._own_score(bare), again=True).linear)
             for twin in self._twins(term):
                 linear = self.there(base.linear, with_term(without(base.terms, term), twin))
                 if linear and self._own_score(linear) > self.score(base) - GROSS:
                     self._fit(linear)
 
     def _is_gross(self, base: Fit, term: Term) -> bool:
-        """Return whether a term is an error in the data without which the linear problem is far less probable."""
-        if not term.is_data_error:
+        """Return whether a term is a unit or a regression without which the linear problem is far less probable: no
+        cause does what it does, but a cause may do what an offset, a scale, a drift or a delay does.
+        """
+        if term.kind not in GROSS_KINDS:
             return False
         bare = self.there(base.linear, without(base.terms, term))
         return bare is not None and self._own_score(bare) < self.score(base) - GROSS
@@ -188,11 +193,12 @@ class Search:
     def _fit_additions(self, base: Linear) -> None:
         """Fit the best explanations with one term more, except those that are ranked far below the best of all fits.
 
-        Ranks are not compared with one another: far from its point, a linear problem may be much too favourable.
+        What is ranked like the first of them is fitted, too, however well that one does: a rank is of the linear
+        problem, which may be too strict with all of them, and twins have one rank.
         """
-        here = self._linear_score(base)
-        for score, linear in self._best_additions(base)[:FITTED]:
-            if score > max(here - WORTH, self.score(self.ranked()[0]) - WITHIN):
+        here, added = self._linear_score(base), self._best_additions(base)[:FITTED]
+        for score, linear in added:
+            if score > max(here - WORTH, min(self.score(self.ranked()[0]), added[0][0]) - WITHIN):
                 self._fit(linear, score)
 
     def _twins(self, term: Term) -> Iterator[Term]:
@@ -213,12 +219,13 @@ class Search:
                     size=-term.size,
                 )
 
-    def _fit(self, start: Linear, expected: float = -np.inf) -> Fit:
+    def _fit(self, start: Linear, expected: float = -np.inf, *, again: bool = False) -> Fit:
         """Return the fit of an explanation from a start; also from the nominal model, if it is much less probable than
-        expected of the linear problem: what another explanation moved may bar the way there.
+        expected of the linear problem: what another explanation moved may bar the way there. One that was fitted before
+        is fitted `again` only if much more is expected.
         """
         name = key(start.terms)
-        if name in self._tried:
+        if name in self._tried and not (again and expected > self.score(self.fits[name]) + WORTH):
             return self.fits[name]
         if self.fits and process_time() > self._end:
             raise _TimeOverError
@@ -233,6 +240,7 @@ class Search:
                 fitted = max(fitted, fit(self.problem, nominal), key=self.score)
         if name not in self.fits or fitted.log_evidence > self.fits[name].log_evidence:
             self.fits[name] = fitted
+            self._left.discard(name)
         return self.fits[name]
 
     def _greedy(self, nominal: Linear) -> Linear:

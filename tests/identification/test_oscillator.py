@@ -163,7 +163,9 @@ def test_a_verdict_is_text_json_and_a_picture(tmp_path):
 @pytest.mark.long
 @pytest.mark.parametrize("seed", [88, 194])
 def test_what_is_left_of_a_structure_error_is_not_named(seed):
-    """A rounded drive leaves 1.5 levels of the sensor; a late one a damping that is off by a tenth of a per cent."""
+    """Scale and drive are twins, though the fit of one gains more than the linear problem says; and an explanation with
+    a term less is fitted again from where one with a term of no size ends.
+    """
     from benchmarks.diagnosis.structure import run
 
     assert run(seed)[3] == ()
