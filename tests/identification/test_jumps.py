@@ -139,3 +139,11 @@ def test_a_search_is_ended_by_its_time_and_says_so():
     assert any("ended" in note for note in verdict.notes)
     with pytest.raises(UserError, match="seconds is 0"):
         sd.diagnose(record(), model(), seconds=0)
+
+
+def test_a_channel_that_always_holds_its_readings_is_not_stuck():
+    """Twelve equal readings in a row are no surprise where all readings come in twelves."""
+    made = record()
+    columns = dict(made.columns)
+    columns["speed"] = np.repeat(columns["speed"][6::12], 12)
+    assert sd.diagnose(sd.Record(made.time, columns), model()).verdict == "nothing_wrong"
