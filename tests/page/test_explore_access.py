@@ -247,12 +247,12 @@ def test_pages_that_nobody_looks_at_are_forgotten(server: Server) -> None:
 
     with opened(server) as page:
         sizes = []
-        for _ in range(3):
-            for _ in range(MOST_TABS):
+        for _ in range(2):  # the heap fills over the first fifty pages, and then stands still
+            for _ in range(4 * MOST_TABS):
                 assert server.get("/", Cookie=server.cookie).status == 200
             sizes.append(server.memory())
         assert server.memory("Threads") < MOST_TABS
-        assert sizes[2] - sizes[1] < 0.1 * 1600 * MOST_TABS, "a page took 1600 kB"
+        assert sizes[1] - sizes[0] < 0.1 * 1600 * 4 * MOST_TABS, "a page took 1600 kB"
         page.send(page.find(tag="q-slider"), "32.5")
         page.wait_for("Changed; the run took")
 
