@@ -252,7 +252,7 @@ def page_of_diagnosis(
             outcome=_outcome(verdict, logged),
             command=command,
             answers=[Answer(**trial._asdict()) for trial in summary(verdict, logged[0].setting.trial.source)],
-            warnings={"What else to know": verdict.notes} if verdict.notes else {},
+            notes=verdict.notes,
             sections=[
                 _section(section, figures)
                 for section in sections(verdict, about(logged))

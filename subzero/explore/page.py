@@ -380,6 +380,8 @@ class Tab:
             )
             for words in (*stopped, *reported):
                 ui.label(words).classes("warning")
+            for note in summary["notes"]:
+                ui.label(note["message"])
 
     def _move_bar(self) -> None:
         self.bar.set_value(self.fraction)

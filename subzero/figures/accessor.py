@@ -27,7 +27,7 @@ from subzero.channels import BY_NAME, RENAMED_CHANNELS, TIME, channels_of
 from subzero.errors import UserError, chosen, printable, short, suggestion
 from subzero.files.integrity import COPIES, DamagedError, check_arrays, check_digest, claimed_bytes
 from subzero.files.read_file import UnreadableFileError, check_readable
-from subzero.validity import RunWarning, warnings_of
+from subzero.validity import RunWarning, notes_of, warnings_of
 
 if TYPE_CHECKING:
     import pandas as pd  # type: ignore[import-untyped]
@@ -170,6 +170,11 @@ class RunAccessor:
     def warnings(self) -> tuple[RunWarning, ...]:
         """The warnings about the run; none is best."""
         return tuple(warnings_of(self._run))
+
+    @property
+    def notes(self) -> tuple[RunWarning, ...]:
+        """What else to know of the run, which is no fault."""
+        return tuple(notes_of(self._run))
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the channels as a table, one row for each time; xarray's own has one for each node, term and axis."""

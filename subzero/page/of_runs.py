@@ -48,6 +48,7 @@ def page_of_runs(
             outcome=[line for label in labels for line in _outcome(label, summary[label])],
             command=command,
             warnings=_warnings(summary, labels),
+            notes=[f"{label} run: {each['message']}" for label in labels for each in summary[label]["notes"]],
             sections=_sections(_tables(summary, labels), figures),
             replay=encode(actors_of(runs), record) if _can_be_replayed(first) else None,
             sources=_sources(first),

@@ -130,6 +130,7 @@ class Report:
         command: the line that does it again.
         answers: answers to the first questions of a reader who was not there.
         warnings: the warnings, by run.
+        notes: sentences that are worth knowing, and no fault.
         sections: numbers and figures, in the order in which one reads them.
         replay: of `subzero.page.replay.encode`; None without one.
         replay_words: remarks on the replay that its controls do not give.
@@ -145,6 +146,7 @@ class Report:
     command: str
     answers: Sequence[Answer] = ()
     warnings: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    notes: Sequence[str] = ()
     sections: Sequence[Section] = ()
     replay: Mapping[str, Any] | None = None
     replay_words: str = ""

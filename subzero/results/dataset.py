@@ -21,7 +21,7 @@ import scenarios
 from subzero.channels import BY_NAME, CHANNELS, LISTED, TIME, listed_channels
 from subzero.errors import DISTRIBUTION, printable
 from subzero.model import Model
-from subzero.validity import as_json, check_run
+from subzero.validity import as_json, check_run, notes_on
 from vehicle import BREAKDOWN, STATE_SIZE
 from vehicle.channels import FIRST_COMMAND
 
@@ -176,9 +176,10 @@ def _thruster_names(model: Model) -> dict[str, Variable]:
 def record_accuracy(
     result: PlainRun, trial: scenarios.Trial, model: Model, accuracy: Accuracy | None
 ) -> None:
-    """Write into the attributes of a run how far its force can be trusted, and all that may be wrong with it."""
+    """Write into the attributes of a run how far its force can be trusted, what may be wrong with it, and notes."""
     result.attrs["accuracy"] = json.dumps(_accuracy_numbers(accuracy))
     result.attrs["warnings"] = as_json(check_run(result, trial, model))
+    result.attrs["notes"] = as_json(notes_on(result, trial, model))
 
 
 def channel_values(run: Run, model: Model) -> dict[str, np.ndarray]:

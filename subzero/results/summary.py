@@ -15,7 +15,7 @@ import numpy as np
 
 from subzero.channels import BY_NAME, AnyRun, channels_of
 from subzero.records.record import Fit, fits
-from subzero.validity import warnings_of
+from subzero.validity import notes_of, warnings_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,6 +38,7 @@ def summarise(run: AnyRun) -> dict[str, Any]:
         "outcome": run.attrs["outcome"],
         "outcome_message": run.attrs["outcome_message"],
         "warnings": [warning._asdict() for warning in warnings_of(run)],
+        "notes": [note._asdict() for note in notes_of(run)],
         "time_at_end_s": number(time[-1]),
         "peak_speed_m_s": number(speed[peak]),
         "time_of_peak_speed_s": number(time[peak]),

@@ -83,14 +83,15 @@ def show(summary: Summary, console: Console, *, whole: bool = False) -> None:
 
 
 def show_warnings(runs: dict[str, Summary], console: Console) -> None:
-    """Print the warnings about each run, sentence by sentence; nothing if there are none."""
+    """Print the warnings about each run and the notes on it, sentence by sentence; nothing if there are none."""
     for label, run in runs.items():
-        if run["warnings"]:
-            console.print(f"Warnings, {label} run:", highlight=False, markup=False)
-        for each in run["warnings"]:
-            row = Table.grid(padding=(0, 1))
-            row.add_row("  •", escape(each["message"]))
-            console.print(row, highlight=False)
+        for kind in ("warnings", "notes"):
+            if run[kind]:
+                console.print(f"{kind.capitalize()}, {label} run:", highlight=False, markup=False)
+            for each in run[kind]:
+                row = Table.grid(padding=(0, 1))
+                row.add_row("  •", escape(each["message"]))
+                console.print(row, highlight=False)
 
 
 def number_groups(summary: Summary, *, whole: bool = True) -> list[list[Row]]:

@@ -6,9 +6,10 @@ much, since when, and what to do. They stand in ``attrs["warnings"]`` of the run
 
 The first seven checks doubt the numbers (`DOUBTS`); the others say that what was asked for cannot be, or that an
 equation does not hold where the run went: there is no air and no sea bed in them, and nothing breaks. A check that has
-no say, such as that of the energies under the paper's scheme, which keeps no balance, is silent.
+no say, such as that of the energies under the paper's scheme, which keeps no balance, is silent. Sentences that are no
+doubts, but worth knowing, stand in ``attrs["notes"]`` (`NOTES`, `notes_of`).
 
-To add a check, add a row to `CHECKS`, and a test that it warns and one that it does not (`tests/validity`).
+To add a check, add a row to `CHECKS` or `NOTES`, and a test that it warns and one that it does not (`tests/validity`).
 """
 
 from __future__ import annotations
@@ -63,7 +64,18 @@ class RunWarning(NamedTuple):
 def check_run(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[RunWarning]:
     """Return everything that may be wrong with a run of a trial with a model, in the order of `CHECKS`."""
     check_is_run("check_run", run)
-    return [RunWarning(name, words) for name, check in CHECKS.items() for words in check(run, trial, model)]
+    return _sentences(CHECKS, run, trial, model)
+
+
+@checked_arguments
+def notes_on(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[RunWarning]:
+    """Return what else to know of a run of a trial with a model, in the order of `NOTES`."""
+    check_is_run("notes_on", run)
+    return _sentences(NOTES, run, trial, model)
+
+
+def _sentences(checks: dict[str, Check], run: AnyRun, trial: scenarios.Trial, model: Model) -> list[RunWarning]:
+    return [RunWarning(name, words) for name, check in checks.items() for words in check(run, trial, model)]
 
 
 class _Supposed:
@@ -104,8 +116,17 @@ def refinement_that_settles(run: AnyRun, trial: scenarios.Trial, model: Model) -
 @checked_arguments
 def warnings_of(run: AnyRun) -> tuple[RunWarning, ...]:
     """Return the warnings that a run carries in its attributes; none from a version that did not know them."""
-    # Older versions did not save warnings; their runs have none.
-    reported = json.loads(run.attrs.get("warnings", "[]"))
+    return _saved(run, "warnings")
+
+
+@checked_arguments
+def notes_of(run: AnyRun) -> tuple[RunWarning, ...]:
+    """Return the notes that a run carries in its attributes; none from a version that did not know them."""
+    return _saved(run, "notes")
+
+
+def _saved(run: AnyRun, attribute: str) -> tuple[RunWarning, ...]:
+    reported = json.loads(run.attrs.get(attribute, "[]"))
     return tuple(RunWarning(each["check"], each["message"]) for each in reported)
 
 
@@ -122,7 +143,6 @@ CHECKS: dict[str, Check] = {
     "slack": slack,
     "closure": closure,
     "push": push,
-    "slack_shape": slack_shape,
     "contradictory_numbers": contradictory_numbers,
     "above_surface": above_surface,
     "below_sea_bed": below_sea_bed,
@@ -134,3 +154,5 @@ CHECKS: dict[str, Check] = {
 """Name → check; the names are those in ``summary.json`` and in the attributes of a run."""
 DOUBTS = ("energy_residual", "resolution", "tow_force", "ill_posed_drum", "slack", "closure", "push")
 """Those that doubt the numbers; the others say what happened."""
+NOTES: dict[str, Check] = {"slack_shape": slack_shape}
+"""Name → check; its sentences are worth knowing, and no doubts."""

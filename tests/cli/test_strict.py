@@ -16,6 +16,7 @@ DOUBTS = [
     {"check": "actuators", "message": "The rudder is commanded to 40° and goes to 20°."},
 ]
 """Square brackets are no markup of the terminal."""
+NOTES = [{"check": "slack_shape", "message": "Up to 17 % of the cable is slack: there its shape means nothing."}]
 
 
 @pytest.fixture
@@ -24,7 +25,7 @@ def doubtful(rails, monkeypatch, make_run):
 
     def simulate(_trial, *, tethered, progress):
         run = make_run(tethered=tethered)
-        return run.assign_attrs(warnings=json.dumps(DOUBTS if tethered else []))
+        return run.assign_attrs(warnings=json.dumps(DOUBTS if tethered else []), notes=json.dumps(NOTES))
 
     monkeypatch.setattr(sys.modules["subzero.simulation.run"], "simulate", simulate)
 
@@ -58,9 +59,17 @@ def test_strict_writes_everything_and_exits_with_3(words, doubtful, tmp_path, ca
 
 
 @pytest.mark.long
-def test_strict_says_nothing_of_a_run_without_warnings(doubtful, tmp_path, capsys):
+def test_strict_says_nothing_of_a_run_with_notes_only(doubtful, tmp_path, capsys):
     assert main(["simulate", "fig6", "--untethered", "--strict", "--out", str(tmp_path)]) == FINE
-    assert "strict" not in capsys.readouterr().err
+    said = capsys.readouterr()
+    assert "strict" not in said.err
+    assert "Notes, untethered run:" in said.out
+    assert NOTES[0]["message"] in " ".join(said.out.split())
+    summary = json.loads((tmp_path / "summary.json").read_text(encoding="utf-8"))
+    assert summary["untethered"]["notes"] == NOTES
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert f"untethered run: {NOTES[0]['message']}" in page
+    assert '<h2 id="warnings">' not in page
 
 
 def test_every_figure_carries_a_line_about_warnings_and_none_without(make_run):

@@ -15,7 +15,7 @@ import scenarios
 import subzero
 from benchmarks.trust_trials import draw
 from subzero.simulation.comparison import halved
-from subzero.validity import CHECKS, refinement_that_settles
+from subzero.validity import CHECKS, NOTES, refinement_that_settles
 from subzero.validity.limits import bend_radii
 from subzero.validity.numerics import drum_is_ill_posed, is_resolved, load_across, roughness
 
@@ -56,7 +56,7 @@ def plain():
 
 def checked(run, trial=FIG6, *, check):
     """Return what one check says of a run."""
-    return CHECKS[check](run, trial, subzero.Model.of(trial))
+    return (CHECKS | NOTES)[check](run, trial, subzero.Model.of(trial))
 
 
 SHIPPED = {"rov_umbilical": {"slack", "bend_radius"}}
@@ -306,12 +306,11 @@ def test_a_drum_that_runs_ahead_leaves_cable_loose_and_its_run_does_not_depend_o
     [
         (500158, 2, True),
         (700037, 4, False),
-        pytest.param(700056, 4, True, marks=pytest.mark.slow),
         pytest.param(900055, 4, True, marks=pytest.mark.slow),
     ],
 )
 def test_a_cable_faster_than_its_waves_with_a_load_across_is_held_against_finer_runs(number, finer, doubted):
-    """Drums without friction: off by 2.5 % without a word, right within 1.2 %, off by 4.3 and by 9 %."""
+    """Drums without friction: off by 2.5 % without a word, right within 1.2 %, and off by 9 %."""
     trial = dataclasses.replace(draw(number), rtol=0.02)
     run = subzero.simulate(trial)
     accuracy = json.loads(run.attrs["accuracy"])
