@@ -74,7 +74,9 @@ def notes_on(run: AnyRun, trial: scenarios.Trial, model: Model) -> list[RunWarni
     return _sentences(NOTES, run, trial, model)
 
 
-def _sentences(checks: dict[str, Check], run: AnyRun, trial: scenarios.Trial, model: Model) -> list[RunWarning]:
+def _sentences(
+    checks: dict[str, Check], run: AnyRun, trial: scenarios.Trial, model: Model
+) -> list[RunWarning]:
     return [RunWarning(name, words) for name, check in checks.items() for words in check(run, trial, model)]
 
 

@@ -16,7 +16,9 @@ DOUBTS = [
     {"check": "actuators", "message": "The rudder is commanded to 40° and goes to 20°."},
 ]
 """Square brackets are no markup of the terminal."""
-NOTES = [{"check": "slack_shape", "message": "Up to 17 % of the cable is slack: there its shape means nothing."}]
+NOTES = [
+    {"check": "slack_shape", "message": "Up to 17 % of the cable is slack: there its shape means nothing."}
+]
 
 
 @pytest.fixture
