@@ -341,7 +341,11 @@ def _visible_from(search: Search) -> dict[str, str]:
     base = search.fits[()].linear
     found: dict[str, str] = {}
     for term in declared(search.problem):
-        if term.kind not in ("scale", "offset", "delay", "cause") or math.isfinite(term.begins) or term.size:
+        if (
+            term.kind not in ("scale", "offset", "delay", "rate", "cause")
+            or math.isfinite(term.begins)
+            or term.size
+        ):
             continue
         if (linear := search.there(base, with_term(base.terms, term), term)) is not None:
             for name, size, unit in _sizes(search.problem, linear, term):
@@ -367,8 +371,8 @@ def _sizes(problem: Problem, linear: Linear, term: Term) -> list[tuple[str, floa
         data = 1.0 / max(1.0 / variance[i] - 1.0 / sd[i] ** 2, 1e-300)
         log = math.log(SEEN_ODDS / term.odds) + 0.5 * math.log(max(sd[i] ** 2 / data, 1.0))
         size = math.sqrt(2.0 * data * log)
-        unit = {"gain": " %", "delay": " s"}.get(entry.kind, "")
-        found.append((term.id, 100.0 * size if entry.kind == "gain" else size, unit))
+        unit = {"gain": " %", "rate": " %", "delay": " s"}.get(entry.kind, "")
+        found.append((term.id, 100.0 * size if unit == " %" else size, unit))
     return found
 
 

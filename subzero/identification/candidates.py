@@ -5,16 +5,18 @@ Errors in the data are open: besides known factors and offsets, the regression o
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from subzero.identification.explanation import (
     CLOCK,
+    CLOCKS,
     GAIN_SCALE,
     OFFSET_LEVELS,
     Term,
+    Terms,
     cause_terms,
     data_terms,
     from_time,
@@ -30,8 +32,9 @@ STUCK_LEVELS = 5.0
 """... while the simulation changes by so many levels of the sensor."""
 SAME_CLOCK = 0.1
 """Odds of a delay of a channel that has the times of the inputs, over those of one with a clock of its own. [-]"""
-DELAYS_TRIED = 4
-"""Delays up to so many usual ones are tried, in steps of half of one."""
+CLOCK_KINDS = tuple(kind for kind, _ in CLOCKS)
+SIZES_TRIED = 4
+"""Errors of a clock up to so many usual ones are tried, in steps of an eighth of one."""
 FEWEST_AFTER = 8
 """An error that begins in the middle of a record has so many readings before and after it."""
 SOFT = 3.0
@@ -51,10 +54,16 @@ def declared(problem: Problem) -> list[Term]:
     duration = max(float(np.ptp(record.time)) for record in problem.records)
     data = [term for term in data_terms(model) if term.target in (*problem.channels, CLOCK)]
     data = [term for term in data if term.kind != "unit" or problem.may_read(term.target, term.factor)]
+    data = [
+        term
+        for term in data
+        if not term.partner
+        or (term.partner in problem.channels and problem.may_be_swapped(term.target, term.partner))
+    ]
     own_clock = {name for record in problem.records for name in record.times}
     data = [
         replace(term, odds=SAME_CLOCK * term.odds)
-        if term.kind == "delay" and term.target not in own_clock
+        if term.kind in CLOCK_KINDS and term.target not in own_clock
         else term
         for term in data
     ]
@@ -63,7 +72,9 @@ def declared(problem: Problem) -> list[Term]:
 
 def suggested(problem: Problem, linear: Linear, terms: list[Term]) -> list[Term]:
     """Return which of some terms are worth a look at a point, and those that its residuals suggest."""
-    found = [term for term in terms if term.kind not in ("unit", "delay") or term.target == CLOCK]
+    found = [term for term in terms if term.kind not in ("unit", "swapped", *CLOCK_KINDS)]
+    found += _swapped(problem, linear, terms)
+    found += [_from_best_size(problem, linear, term) for term in terms if term.kind in CLOCK_KINDS]
     for name in problem.channels:
         if problem.model.channels[name].trusted:
             continue
@@ -74,12 +85,11 @@ def suggested(problem: Problem, linear: Linear, terms: list[Term]) -> list[Term]
 
 def _of_channel(problem: Problem, linear: Linear, name: str, own: list[Term]) -> Iterator[Term]:
     """Yield errors of a channel: known ones that bring it closer, the regression, those from some time on, runs."""
-    each, used = problem.channels[name], problem.used(name, linear.terms)
+    each, used = problem.readings_of(name, linear.terms), problem.used(name, linear.terms)
     e, level, turn = linear.e[name], problem.levels(linear.terms)[name], problem.model.channels[name].turn
     simulated = problem.recorded(name, linear.terms) - e
-    yield from _stuck(problem, name, simulated)
+    yield from _stuck(problem, name, each, simulated)
     before = float(np.mean(e[used] ** 2))
-    yield from _delays(problem, linear, name, own)
     if before < (OFF_LEVELS * level) ** 2:
         return
     known = [term for term in own if term.kind == "unit"]
@@ -87,38 +97,58 @@ def _of_channel(problem: Problem, linear: Linear, name: str, own: list[Term]) ->
         now = _wrapped((each.values - term.offset) / term.factor - simulated, turn)
         if float(np.mean(now[used] ** 2)) < before:
             yield term
-    if (affine := _regression(problem, name, simulated, used)) is not None:
+    if (affine := _regression(problem, name, simulated, each.values, used)) is not None:
         yield affine
     soft = next((term for term in own if term.kind == "offset"), None)
     for term in [*known, *([soft] if soft else [])]:
         yield from _from_some_time(each, term, e, simulated, used, level, turn)
 
 
-def _delays(problem: Problem, linear: Linear, name: str, own: list[Term]) -> Iterator[Term]:
-    """Yield a delay of a channel that begins at the delay which leaves least of it."""
-    term = next((term for term in own if term.kind == "delay"), None)
-    if term is None:
-        return
+def _swapped(problem: Problem, linear: Linear, terms: list[Term]) -> Iterator[Term]:
+    """Yield pairs of channels that are closer to the simulation of each other than to their own."""
+    for term in (term for term in terms if term.partner):
+        pair = (term.target, term.partner)
+        if _left(problem, linear, pair, with_term(linear.terms, term)) < _left(
+            problem, linear, pair, linear.terms
+        ):
+            yield term
+
+
+def _left(problem: Problem, linear: Linear, names: Sequence[str], terms: Terms) -> float:
+    """Return the sum of log mean squares of what a point leaves of channels with the errors of some terms undone."""
+    total = 0.0
+    for name in names:
+        simulated = problem.recorded(name, linear.terms) - linear.e[name]
+        e = _wrapped(problem.recorded(name, terms) - simulated, problem.model.channels[name].turn)
+        total += np.log(np.mean(e[problem.used(name, terms) & np.isfinite(simulated)] ** 2))
+    return float(total)
+
+
+def _from_best_size(problem: Problem, linear: Linear, term: Term) -> Term:
+    """Return an error of a clock that begins at the size which leaves least of the channels that it is about."""
     terms = with_term(linear.terms, term)
     entries = problem.entries(terms)
-    (place,) = [i for i, entry in enumerate(entries) if entry.kind == "delay" and entry.name == name]
+    (place,) = [i for i, each in enumerate(entries) if (each.kind, each.name) == (term.kind, term.target)]
     known = {entry.identity: value for entry, value in zip(linear.entries, linear.x.tolist(), strict=True)}
     x = np.array([known.get(entry.identity, entry.centre) for entry in entries])
-    sizes = np.linspace(-DELAYS_TRIED, DELAYS_TRIED, 4 * DELAYS_TRIED + 1)
+    sizes = np.linspace(-SIZES_TRIED, SIZES_TRIED, 16 * SIZES_TRIED + 1)
     sets = [np.where(np.arange(x.size) == place, size * entries[place].sd, x) for size in sizes]
     found, _ = problem.residuals(terms, entries, sets)
-    used = problem.used(name, terms)
-    size = float(sizes[np.argmin(np.mean(found[name][used] ** 2, axis=0))])
-    yield replace(term, size=size)
+    levels, left = problem.levels(terms), np.zeros(sizes.size)
+    for name in problem.channels if term.target == CLOCK else [term.target]:
+        left += np.mean((found[name][problem.used(name, terms)] / levels[name]) ** 2, axis=0)
+    return replace(term, size=float(sizes[np.argmin(left)]))
 
 
 def _wrapped(values: np.ndarray, turn: float) -> np.ndarray:
     return values - turn * np.rint(values / turn) if turn else values
 
 
-def _regression(problem: Problem, name: str, simulated: np.ndarray, used: np.ndarray) -> Term | None:
+def _regression(
+    problem: Problem, name: str, simulated: np.ndarray, values: np.ndarray, used: np.ndarray
+) -> Term | None:
     """Return y = a + b x of a channel by least squares, if the readings follow the simulation at all."""
-    h, y = simulated[used], problem.channels[name].values[used]
+    h, y = simulated[used], values[used]
     spread = float(np.std(h))
     if spread <= problem.levels()[name] or problem.model.channels[name].angle:
         return None
@@ -169,9 +199,9 @@ def _median_at_end(e: np.ndarray) -> float:
     return float(np.median(e[-max(e.size // 4, 1) :]))
 
 
-def _stuck(problem: Problem, name: str, simulated: np.ndarray) -> Iterator[Term]:
+def _stuck(problem: Problem, name: str, each: Readings, simulated: np.ndarray) -> Iterator[Term]:
     """Yield the longest run of equal readings in each record, while the simulation moves."""
-    each, sensor = problem.channels[name], problem.model.channels[name]
+    sensor = problem.model.channels[name]
     for record in np.unique(each.record).tolist():
         at = np.flatnonzero(np.isfinite(each.values) & ~each.spikes & (each.record == record))
         values = each.values[at]

@@ -5,7 +5,9 @@ sentence.
     cause from a time    the same, with the time as a free number
     tolerances           every parameter may move four times as far as its tolerance: a calibration, no cause
     data error           y = a + b x of a channel, with free a and b or at known values, throughout or from a time on
-    drift, delay         of a channel: a line in time; another clock
+    drift                of a channel, a line in time
+    delay, rate          another clock, of a channel or of all of them: late or early, fast or slow
+    swapped              two channels have each other's readings
     stuck                a run of equal readings says nothing
 """
 
@@ -13,7 +15,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -30,9 +33,9 @@ TUNED_WIDER = 10.0
 evidence on that channel. [-]"""
 GAIN_SCALE = 0.1
 """Usual error of the scale of a sensor (one standard deviation). [-]"""
-BEYOND, OFFSET_LEVELS, DELAY_INTERVALS = 10.0, 30.0, 5.0
+BEYOND, OFFSET_LEVELS, DELAY_INTERVALS, RATE_SCALE = 10.0, 30.0, 5.0, 0.03
 """Usual error of an offset or a drift, in tolerances of the sensor's zero, or in its levels where none is declared; of
-a delay, in sampling intervals. [-]"""
+a delay, in sampling intervals; of the rate of a clock. [-]"""
 
 PRIOR_CAUSE, MOST_LIKELY, PRIOR_TOLERANCES, PRIOR_DATA, PRIOR_NEXT_DATA = 0.5, 0.05, 0.1, 0.1, 0.3
 """Prior odds that any one cause acts, and most of a single one; that tolerances are too narrow; that the readings of a
@@ -43,6 +46,8 @@ ONSET_ODDS = 0.2
 ONSET_SHARES = tuple(np.arange(0.1, 0.95, 0.1).tolist())
 """Where a search for an onset begins, over the duration of a record. [-]"""
 
+CLOCKS = (("delay", "is late or early"), ("rate", "runs fast or slow"))
+"""Errors of a clock."""
 KNOWN: tuple[tuple[float, float, str], ...] = (
     (-1.0, 0.0, "the other sign"),
     (180.0 / math.pi, 0.0, "degrees for radians"),
@@ -79,7 +84,7 @@ class Entry:
     """A free number of an explanation.
 
     Attributes:
-        kind: number, start, cause, change, since, unknown; of a sensor offset, step, gain, drift, delay.
+        kind: number, start, cause, change, since, unknown; of a sensor offset, step, gain, drift, delay, rate.
         name: of the parameter, cause and number ("overflow.lip"), unknown input, or channel.
         record: which it belongs to; −1 if all share it.
         centre, sd: mean and standard deviation of its prior. [its unit]
@@ -109,8 +114,9 @@ class Term:
     Attributes:
         id: such as "overflow", "overflow@12", "scale:depth", "unit:depth".
         sentence: what it says, in words.
-        kind: cause, tolerances, offset, scale, affine, unit, drift, delay, stuck.
+        kind: cause, tolerances, offset, scale, affine, unit, drift, delay, rate, swapped, stuck.
         target: the cause, or the channel.
+        partner: the other channel of two that are swapped.
         odds: prior odds that it holds.
         begins: time from which it holds; −∞ throughout. [s]
         ends: time until which it holds. [s]
@@ -123,6 +129,7 @@ class Term:
     sentence: str
     kind: str
     target: str = ""
+    partner: str = field(default="", kw_only=True)
     odds: float = 0.01
     begins: float = -math.inf
     ends: float = math.inf
@@ -136,11 +143,16 @@ class Term:
         """Whether it is about the record, not about the model."""
         return self.kind not in ("cause", "tolerances")
 
+    def about(self, target: str) -> Term:
+        """Return the same error of another channel."""
+        id, sentence = (words.replace(self.target, target, 1) for words in (self.id, self.sentence))
+        return replace(self, id=id, sentence=sentence, target=target)
+
     @property
     def slot(self) -> tuple[str, str]:
         """What an explanation can have only one of: a channel's y = a + b x, one cause."""
         affine = ("offset", "scale", "affine", "unit")
-        return (AFFINE if self.kind in affine else self.kind, self.target)
+        return (AFFINE if self.kind in affine else self.kind, "" if self.partner else self.target)
 
 
 Terms = tuple[Term, ...]
@@ -148,14 +160,25 @@ Terms = tuple[Term, ...]
 
 
 def with_term(terms: Terms, term: Term) -> Terms:
-    """Return an explanation with one more term, in the place of one that says something about the same."""
-    kept = [other for other in terms if other.slot != term.slot]
+    """Return an explanation with one more term, in the place of one that says something about the same.
+
+    What was said of two channels goes with their readings if these are exchanged.
+    """
+    kept = [_exchanged(other, term) for other in terms if other.slot != term.slot]
     return tuple(sorted([*kept, term], key=lambda other: other.id))
 
 
 def without(terms: Terms, term: Term) -> Terms:
     """Return an explanation without a term."""
-    return tuple(other for other in terms if other.id != term.id)
+    return tuple(_exchanged(other, term) for other in terms if other.id != term.id)
+
+
+def _exchanged(term: Term, swap: Term) -> Term:
+    """Return a term about the other of two channels whose readings are exchanged."""
+    pair = (swap.target, swap.partner)
+    if not swap.partner or not term.is_data_error or term.target not in pair:
+        return term
+    return term.about(pair[term.target == pair[0]])
 
 
 def log_prior(terms: Terms, loggers: dict[str, str]) -> float:
@@ -219,7 +242,7 @@ def data_terms(model: Model) -> list[Term]:
             other for other in model.channels.values() if sensor.logger and other.logger == sensor.logger
         ]
         if len(sharing) < 2:  # channels of one logger have one clock
-            soft.append(("delay", "is late or early against the inputs"))
+            soft += [(kind, words + " against the inputs") for kind, words in CLOCKS]
         found += [
             Term(f"{kind}:{name}", f"{name} {words}", kind, name, odds / len(soft)) for kind, words in soft
         ]
@@ -240,7 +263,20 @@ def data_terms(model: Model) -> list[Term]:
     if len(suspects) > 2 and len(suspects) == len(model.channels):  # of two, the delay of one says it
         sentence = "all channels are late or early, or the inputs early or late"
         found.append(Term(f"delay:{CLOCK}", sentence, "delay", CLOCK, PRIOR_DATA / 5.0))
-    return found
+        sentence = "the clock of all channels runs fast or slow against that of the inputs"
+        found.append(Term(f"rate:{CLOCK}", sentence, "rate", CLOCK, PRIOR_DATA / 5.0))
+    pairs = list(combinations(suspects, 2))
+    return found + [
+        Term(
+            f"swapped:{a}/{b}",
+            f"{a} and {b} have each other's readings",
+            "swapped",
+            a,
+            odds / len(pairs),
+            partner=b,
+        )
+        for a, b in pairs
+    ]
 
 
 def from_time(term: Term, record: int, time: float, share: float) -> Term:
@@ -322,6 +358,7 @@ OF_TERM: dict[str, tuple[str, ...]] = {
     "affine": ("offset", "gain"),  # about the regression, which is in the term
     "drift": ("drift",),
     "delay": ("delay",),
+    "rate": ("rate",),
 }
 """Kind of a term → kinds of the numbers of a sensor that it frees; of an offset from a time on, "step"."""
 
@@ -343,6 +380,7 @@ def _of_sensor(name: str, model: Model, terms: Terms, level: float, interval: fl
         "drift": off,
         "gain": GAIN_SCALE,
         "delay": DELAY_INTERVALS * interval,
+        "rate": RATE_SCALE,
     }
     spreads = {kind: math.hypot(usual.get(kind, 0.0), wide[kind] * (kind in free)) for kind in wide}
     bounds = {"gain": (-0.9, 9.0)}

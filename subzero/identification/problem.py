@@ -39,7 +39,7 @@ MAX_KNOTS = 200
 """Most knots of one unknown input in one record: its time is lengthened where there would be more."""
 FIXED = 1e-6
 """Prior standard deviation of a number that is fixed, over its own. [-]"""
-CORRECTIONS = ("offset", "step", "gain", "drift", "delay")
+CORRECTIONS = ("offset", "step", "gain", "drift", "delay", "rate")
 """Entries that change the record, not the simulation."""
 
 Progress = Callable[[float, str], None]
@@ -163,7 +163,16 @@ class Problem:
         """Return the prior knowledge of a sensor under an explanation: a level that was read off readings of a wrong
         unit is in that unit, and goes with them.
         """
-        prior, sensor = self.channels[name].prior, self.model.channels[name]
+        own, held, sensor = (
+            self.channels[name].prior,
+            self.readings_of(name, terms).prior,
+            self.model.channels[name],
+        )
+        prior = replace(
+            own,
+            level=held.level if sensor.noise is None else own.level,
+            resolution=held.resolution if sensor.resolution is None else own.resolution,
+        )
         wrong = [t for t in terms if t.target == name and t.slot[0] == AFFINE and not np.isfinite(t.begins)]
         if not wrong:
             return prior
@@ -210,7 +219,7 @@ class Problem:
             usual = max(levels[name], MEDIAN_TO_SD * float(np.median(np.abs(e[name][used]))))
             alone = spikes(np.where(used, e[name], np.nan), SPIKE * usual, 0.0)
             if 0 < alone.sum() <= RARE * each.used.sum():
-                found[name] = alone
+                found[_column(name, terms)] = alone
         return found
 
     def without(self, outliers: Mapping[str, np.ndarray]) -> list[Record]:
@@ -229,6 +238,11 @@ class Problem:
         """Channel → its sampling interval. [s]"""
         own = {name: each.prior.interval for name, each in self.channels.items()}
         return {**own, CLOCK: float(np.median(np.diff(self.records[0].time)))}
+
+    @cached_property
+    def _longest(self) -> float:
+        """Duration of the longest record. [s]"""
+        return max(float(np.ptp(record.time)) for record in self.records)
 
     @cached_property
     def knots(self) -> list[dict[str, np.ndarray]]:
@@ -316,24 +330,34 @@ class Problem:
     ) -> np.ndarray:
         """Return simulated readings of a channel at its times (m,)."""
         each = self.channels[name]
-        late = sum(
-            x[i] for i, entry in enumerate(entries) if entry.kind == "delay" and entry.name in (name, CLOCK)
+        late, fast = (
+            sum(x[i] for i, entry in enumerate(entries) if entry.kind == kind and entry.name in (name, CLOCK))
+            for kind in ("delay", "rate")
         )
         found = np.empty(each.values.size)
         for k, record in enumerate(self.records):
             at = each.record == k
             if at.any():
-                found[at] = np.interp(each.time[at] - late, record.time, readings[k][name])
+                true = each.time[at] - late - fast * (each.time[at] - record.time[0])
+                found[at] = np.interp(true, record.time, readings[k][name])
         return found
 
     def recorded(self, name: str, terms: Terms) -> np.ndarray:
         """Return the readings of a channel with its known errors undone: (y − a)/b (m,), noise with them."""
-        each = self.channels[name]
+        each = self.readings_of(name, terms)
         values = each.values.copy()
         for term in self._errors(name, terms):
             at = self._where(each, term)
             values[at] = (values[at] - term.offset) / term.factor
         return values
+
+    def readings_of(self, name: str, terms: Terms) -> Readings:
+        """Return the readings of a channel, which are in the column of another one if the two are swapped."""
+        return self.channels[_column(name, terms)]
+
+    def may_be_swapped(self, a: str, b: str) -> bool:
+        """Return whether two channels have the same times, so that their readings may be exchanged."""
+        return np.array_equal(self.channels[a].time, self.channels[b].time)
 
     def shown(
         self, name: str, terms: Terms, entries: Sequence[Entry], x: np.ndarray, simulated: np.ndarray
@@ -366,7 +390,7 @@ class Problem:
         for term in terms:
             if not term.is_data_error or term.target not in self.channels:
                 continue
-            each = self.channels[term.target]
+            each = self.readings_of(term.target, terms)
             if term.kind == "stuck":
                 total -= self._log_equal(each, term)
             else:
@@ -382,7 +406,7 @@ class Problem:
 
     def used(self, name: str, terms: Terms) -> np.ndarray:
         """Return which readings of a channel an explanation uses (m,)."""
-        each = self.channels[name]
+        each = self.readings_of(name, terms)
         stuck = [self._where(each, term) for term in terms if term.kind == "stuck" and term.target == name]
         return each.used & ~np.any(stuck, axis=0) if stuck else each.used
 
@@ -390,7 +414,9 @@ class Problem:
         """Return the step of the sensitivity to each entry (n,), to the side that its bounds leave."""
         step = np.array(
             [
-                STEP_DELAY * self.intervals[entry.name] if entry.kind == "delay" else STEP * entry.sd
+                STEP_DELAY * self.intervals[entry.name] / (self._longest if entry.kind == "rate" else 1.0)
+                if entry.kind in ("delay", "rate")
+                else STEP * entry.sd
                 for entry in entries
             ]
         )
@@ -461,6 +487,12 @@ class Problem:
         start = np.array([record.time[0] for record in self.records])[each.record]
         span = np.array([np.ptp(record.time) for record in self.records])[each.record]
         return (each.time - start) / span - 0.5
+
+
+def _column(name: str, terms: Terms) -> str:
+    """Return the channel in whose column the readings of a channel are."""
+    pairs = [(term.target, term.partner) for term in terms if term.partner]
+    return next((b if name == a else a for a, b in pairs if name in (a, b)), name)
 
 
 def _moves(entry: Entry, k: int) -> bool:

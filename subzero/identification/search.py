@@ -37,11 +37,11 @@ WITHIN = 5.0
 """Explanations within this of the best are expanded, too. [nats]"""
 WORTH, GROSS = 3.0, 100.0
 """A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one. [nats]"""
-GROSS_KINDS = ("unit", "affine")
+GROSS_KINDS = ("unit", "affine", "swapped")
 """Errors in the data that may be gross."""
 OF_MODEL = ("number", "start", "unknown")
 """Kinds of entries that every explanation has."""
-TWINS = ("offset", "scale", "affine", "delay")
+TWINS = ("offset", "scale", "affine", "delay", "rate")
 """Errors that another channel of the unit may have in the place of the first one."""
 MOST_FITS = 60
 """The search ends after so many fits, and says so."""
@@ -210,10 +210,7 @@ class Search:
             alike = sensors[name].unit == sensors[term.target].unit
             if name != term.target and alike and not sensors[name].trusted:
                 yield replace(
-                    term,
-                    id=term.id.replace(term.target, name, 1),
-                    sentence=term.sentence.replace(term.target, name, 1),
-                    target=name,
+                    term.about(name),
                     factor=1.0 / term.factor,
                     offset=-term.offset / term.factor,
                     size=-term.size,
@@ -248,7 +245,7 @@ class Search:
         other, as long as each is a gross error.
         """
         here, before = nominal, self._linear_score(nominal)
-        errors = [term for term in self._terms if term.kind in ("unit", "affine")]
+        errors = [term for term in self._terms if term.kind in GROSS_KINDS]
         while len(here.terms) < MOST_TERMS:
             added = self._additions(here, errors)
             if not added or added[0][0] < before + GROSS:
@@ -334,5 +331,5 @@ class Search:
 
 def _begin(entry: Entry, term: Term | None) -> float:
     """Return where the search for a new number begins."""
-    away = term.size * entry.sd if term and entry.kind in ("cause", "delay") else 0.0
+    away = term.size * entry.sd if term and entry.kind in ("cause", "delay", "rate") else 0.0
     return float(np.clip(entry.centre + away, entry.low, entry.high))

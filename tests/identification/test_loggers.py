@@ -1,0 +1,104 @@
+"""What a logger does to its columns: two of them exchanged, and clocks that run fast.
+
+Verifies: both are named, alone and beside a cause; a swap also where the noise of the channels is not declared and one
+of them is in another unit as well; a clock of one channel, with times of its own or not, and that of all channels
+against the inputs, to 3 standard deviations. Columns that are in their places and clocks that run right are not named.
+Truth is exact: a heated rod, its middle and its end are first-order lags, one behind the other, and a fast clock reads
+the exact solution at other times.
+"""
+
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import subzero.diagnosis as sd
+
+STEP = 0.1
+NOISE = {"rod": 0.05, "middle": 0.03, "end": 0.02}
+
+
+def rod(p, u, t):
+    """Three first-order lags, exact for a power that is held."""
+    a, b, c = p["a"], 1.0 / 1.5, 1.0 / 2.0
+    A = np.array([[-a, 0.0, 0.0, p["gain"]], [b, -b, 0.0, 0.0], [0.0, c, -c, 0.0], [0.0] * 4])
+    step, state, shown = expm(A * (t[1] - t[0])), np.zeros(3), []
+    for power in u["power"]:
+        shown.append(state)
+        state = step[:3, :3] @ state + step[:3, 3] * power
+    return dict(zip(NOISE, np.array(shown).T, strict=True))
+
+
+def model(*, noise=True):
+    return sd.Model(
+        rod,
+        channels={name: sd.Sensor(noise=level if noise else None, unit="K") for name, level in NOISE.items()},
+        inputs=["power"],
+        parameters=[sd.Number("a", 1.0, tolerance=0.02), sd.Number("gain", 1.0, tolerance=0.02)],
+        causes=[
+            sd.Cause("loss", "the rod loses heat", changes={"a": 0.3}),
+            sd.Cause("heater", "the heater is weak", changes={"gain": 0.3}),
+        ],
+        unknown=[sd.Unknown("command:power", size=0.02, time=1.0)],
+    )
+
+
+def record(seed=0, *, late=(), fast=0.0, own=False, samples=300, **numbers):
+    """Return a record of a rod; the clocks of some channels are fast by a share, with times of their own or not."""
+    rng = np.random.default_rng(seed)
+    power = np.repeat(rng.choice([-4.0, 0.0, 4.0, 8.0], samples // 20), 20)
+    time, parts = STEP * np.arange(samples), 10
+    fine = STEP / parts * np.arange(samples * parts)
+    shown = rod({"a": 1.0, "gain": 1.0, **numbers}, {"power": np.repeat(power, parts)}, fine)
+    columns = {
+        name: np.interp(time / (1.0 + fast) if name in late else time, fine, values)
+        + NOISE[name] * rng.standard_normal(samples)
+        for name, values in shown.items()
+    }
+    times = {name: time.copy() for name in late} if own else {}
+    return sd.Record(time, {**columns, "power": power}, times=times)
+
+
+def swapped(given, a, b):
+    columns = dict(given.columns)
+    columns[a], columns[b] = columns[b], columns[a]
+    return sd.Record(given.time, columns)
+
+
+@pytest.mark.parametrize("noise", [True, False])
+def test_two_columns_that_are_exchanged_are_named(noise):
+    verdict = sd.diagnose(swapped(record(), "rod", "middle"), model(noise=noise))
+    assert verdict.verdict == "data_error"
+    assert [each.id for each in verdict.named] == ["swapped:rod/middle"]
+    assert verdict.named[0].sentence == "rod and middle have each other's readings"
+
+
+def test_exchanged_columns_beside_a_cause():
+    verdict = sd.diagnose(swapped(record(a=1.4), "middle", "end"), model())
+    assert {each.id for each in verdict.named} == {"swapped:middle/end", "loss"}
+
+
+def test_exchanged_columns_of_which_one_is_in_another_unit():
+    given = record(1)
+    columns = {**given.columns, "rod": given.columns["rod"] * 10.0}
+    verdict = sd.diagnose(swapped(sd.Record(given.time, columns), "rod", "end"), model())
+    assert {each.id for each in verdict.named} == {"swapped:rod/end", "unit:rod"}
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_the_clock_of_a_channel_that_runs_fast_is_named_with_its_rate(own):
+    verdict = sd.diagnose(record(2, late=("middle",), fast=0.02, own=own), model())
+    assert [each.id for each in verdict.named] == ["rate:middle"]
+    (rate,) = verdict.named[0].estimates
+    assert rate.value == pytest.approx(0.02 / 1.02, abs=3.0 * rate.sd)
+    assert rate.sd < 0.001
+
+
+def test_a_clock_of_all_channels_that_runs_fast_against_the_inputs():
+    verdict = sd.diagnose(record(3, late=tuple(NOISE), fast=0.02), model())
+    assert [each.id for each in verdict.named] == ["rate:clock"]
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_columns_in_their_places_and_right_clocks_are_not_named(seed):
+    verdict = sd.diagnose(record(seed, late=("middle",), own=True), model())
+    assert verdict.verdict == "nothing_wrong"
