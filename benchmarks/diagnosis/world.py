@@ -315,6 +315,8 @@ def _by_any_model(logged: Logged, seed: int) -> dict[str, Any]:
     verdict = identification.diagnose(records, model)
     listed: dict[str, float] = {}
     for name, p in verdict.explanations.items():
+        if name == identification.UNSEEN:
+            continue
         known = " + ".join(map(_as_in_catalogue, name.split(" + ")))
         listed[known] = listed.get(known, 0.0) + p
     first, p = max(listed.items(), key=lambda pair: pair[1])

@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from time import process_time
 
 import numpy as np
+from scipy.special import logsumexp
 from threadpoolctl import threadpool_limits
 
 from subzero.arguments import checked_arguments
@@ -38,10 +39,12 @@ from subzero.identification.verdict import (
     curves_of,
 )
 
-NAMED_PROBABILITY = 0.9
+NAMED_PROBABILITY, HEALTHY_PROBABILITY = 0.9, 0.5
 """A term is named from this probability on, over all explanations."""
 SEEN_ODDS = 9.0
 """Odds from which on a term would be seen: of NAMED_PROBABILITY."""
+UNSEEN = "one thing more that these records do not show"
+"""All explanations with one term more than the best one that were not worth a fit."""
 PASSES = 3
 """Most searches of a diagnosis, each without the outliers that the one before has shown."""
 RELATED = 3.0
@@ -130,7 +133,7 @@ def _concluded(search: Search, held_out: Sequence[Record], outliers: Mapping[str
         named=named,
         suspected=suspected,
         explanations=_shown(ranked, probabilities),
-        relations=tuple(_relations(problem, ranked, probabilities)),
+        relations=tuple(_relations(problem, ranked, probabilities / probabilities.sum())),
         budget=budget,
         remainder=_remainder(problem, best, near),
         visible_from=_visible_from(search),
@@ -141,15 +144,16 @@ def _concluded(search: Search, held_out: Sequence[Record], outliers: Mapping[str
 
 
 def _probabilities(search: Search, ranked: Sequence[Fit]) -> np.ndarray:
+    """Return the probability of every explanation; what is left to 1 is that of one term more which is not seen."""
     log = np.array([search.score(each) for each in ranked])
-    weights = np.exp(log - log.max())
-    return weights / weights.sum()
+    return np.exp(log - logsumexp([*log, search.log_unseen()]))
 
 
 def _marginal(ranked: Sequence[Fit], probabilities: np.ndarray) -> dict[str, float]:
-    """Return the probability of every term, over all explanations."""
+    """Return the probability of every term, over all explanations; what is not seen may be added to the best one."""
+    unseen = 1.0 - float(probabilities.sum())
     found: dict[str, float] = {}
-    for each, p in zip(ranked, probabilities.tolist(), strict=True):
+    for each, p in zip((ranked[0], *ranked), (unseen, *probabilities.tolist()), strict=True):
         for term in each.terms:
             found[term.id] = found.get(term.id, 0.0) + p
     return found
@@ -164,9 +168,9 @@ def _kind(
         return CAUSE_NAMED
     if named:
         return DATA_ERROR
-    if suspected or probabilities[0] < NAMED_PROBABILITY:
-        return UNDECIDED
-    return CALIBRATED if best.terms else NOTHING_WRONG
+    if not best.terms and probabilities[0] >= HEALTHY_PROBABILITY:
+        return NOTHING_WRONG
+    return CALIBRATED if best.terms and not suspected and probabilities[0] >= NAMED_PROBABILITY else UNDECIDED
 
 
 def _named(
@@ -209,7 +213,8 @@ def _shown(ranked: Sequence[Fit], probabilities: np.ndarray) -> dict[str, float]
     for each, p in zip(ranked, probabilities.tolist(), strict=True):
         name = " + ".join(_name(term) for term in each.terms) or "nothing is wrong"
         found[name] = found.get(name, 0.0) + p
-    return found
+    found[UNSEEN] = max(1.0 - float(probabilities.sum()), 0.0)
+    return dict(sorted(found.items(), key=lambda pair: -pair[1]))
 
 
 def _name(term: Term) -> str:

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from time import process_time
 
 import numpy as np
+from scipy.special import logsumexp
 
 from subzero.identification.candidates import declared, suggested
 from subzero.identification.explanation import AFFINE, Entry, Term, Terms, log_prior, with_term, without
@@ -62,6 +63,11 @@ def ids(terms: Terms) -> tuple[str, ...]:
     return tuple(term.id for term in terms)
 
 
+def swaps(terms: Terms) -> set[str]:
+    """Return which channels an explanation exchanges."""
+    return {term.id for term in terms if term.partner}
+
+
 class _TimeOverError(Exception):
     """A search has had its time."""
 
@@ -76,6 +82,7 @@ class Search:
         seconds: of processor time, after which no fit begins. [s]
         begin: a fit of other records of these, from whose explanation the search goes on.
         fits: explanation → its best fit.
+        ranks: explanation with one term more than another → its score in the linear problem of that one.
         complete: whether it came to its end.
     """
 
@@ -84,6 +91,7 @@ class Search:
     seconds: float = math.inf
     begin: Fit | None = None
     fits: dict[Key, Fit] = field(default_factory=dict)
+    ranks: dict[Key, dict[Key, float]] = field(default_factory=dict)
     complete: bool = True
 
     def __post_init__(self) -> None:
@@ -102,6 +110,15 @@ class Search:
     def ranked(self) -> list[Fit]:
         """Return all fits, the most probable first."""
         return sorted(self.fits.values(), key=self.score, reverse=True)
+
+    def log_unseen(self) -> float:
+        """Return the log of the sum of the scores of the best explanation with one term more, of those that were not
+        fitted: records that do not show a cause do not exclude it.
+        """
+        best = self.ranked()[0]
+        ranks = self.ranks.get(key(best.terms), {})
+        scores = [min(score, self.score(best)) for name, score in ranks.items() if name not in self.fits]
+        return float(logsumexp(scores)) if scores else -math.inf
 
     def run(self) -> None:
         """Search until no move gains, or the time is over."""
@@ -262,10 +279,9 @@ class Search:
             return []
         if id(base) in self._added:
             return self._added[id(base)][1]
-        again = [
-            self._with_own_noise(linear)
-            for linear in self._worth_own_noise(self._additions(base, self._terms))
-        ]
+        additions = self._additions(base, self._terms)
+        self.ranks[key(base.terms)] = {key(linear.terms): score for score, linear in reversed(additions)}
+        again = [self._with_own_noise(linear) for linear in self._worth_own_noise(additions)]
         found = self._distinct(sorted(again, key=lambda pair: -pair[0]))
         self._added[id(base)] = (base, found)  # kept with its base, so that no other can take its identity
         return found
@@ -310,8 +326,10 @@ class Search:
             entry.identity: (value, i)
             for i, (entry, value) in enumerate(zip(base.entries, base.x.tolist(), strict=True))
         }
-        fresh = [i for i, entry in enumerate(entries) if entry.identity not in known]
-        old = [i for i, entry in enumerate(entries) if entry.identity in known]
+        # Sensitivities are known where a channel has readings: exchanged ones have other gaps.
+        kept = set(known) if swaps(terms) == swaps(base.terms) else set()
+        fresh = [i for i, entry in enumerate(entries) if entry.identity not in kept]
+        old = [i for i, entry in enumerate(entries) if entry.identity in kept]
         x = np.array(
             [known[entry.identity][0] if entry.identity in known else _begin(entry, new) for entry in entries]
         )
