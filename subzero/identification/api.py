@@ -195,7 +195,7 @@ def _estimates(problem: Problem, best: Fit, term: Term) -> tuple[Estimate, ...]:
             found.append(Estimate(name, value, math.sqrt(variance), off))
         elif term.is_data_error and entry.name == term.target and entry.kind in kinds_of(term):
             found += _of_data_error(term, entry, value, math.sqrt(variance))
-    if term.kind == "unit":
+    if term.kind in ("unit", "input"):
         found = [Estimate("factor", term.factor, 0.0, 1.0), Estimate("offset", term.offset, 0.0, 0.0)]
     return tuple(found)
 

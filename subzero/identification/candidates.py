@@ -20,6 +20,7 @@ from subzero.identification.explanation import (
     cause_terms,
     data_terms,
     from_time,
+    input_terms,
     tolerance_term,
     with_term,
 )
@@ -33,6 +34,8 @@ STUCK_LEVELS = 5.0
 SAME_CLOCK = 0.1
 """Odds of a delay of a channel that has the times of the inputs, over those of one with a clock of its own. [-]"""
 CLOCK_KINDS = tuple(kind for kind, _ in CLOCKS)
+RANKED_BY_RESIDUALS = ("unit", "swapped", "input", "exchanged")
+"""Kinds of errors that are worth a look only where the residuals are then smaller."""
 SIZES_TRIED = 4
 """Errors of a clock up to so many usual ones are tried, in steps of an eighth of one."""
 FEWEST_AFTER = 8
@@ -54,6 +57,7 @@ def declared(problem: Problem) -> list[Term]:
     duration = max(float(np.ptp(record.time)) for record in problem.records)
     data = [term for term in data_terms(model) if term.target in (*problem.channels, CLOCK)]
     data = [term for term in data if term.kind != "unit" or problem.may_read(term.target, term.factor)]
+    inputs = [term for term in input_terms(problem.model) if term.target in problem.moving_inputs]
     data = [
         term
         for term in data
@@ -67,12 +71,13 @@ def declared(problem: Problem) -> list[Term]:
         else term
         for term in data
     ]
-    return [*cause_terms(model, duration), tolerance_term(model), *data]
+    return [*cause_terms(model, duration), tolerance_term(model), *data, *inputs]
 
 
 def suggested(problem: Problem, linear: Linear, terms: list[Term]) -> list[Term]:
     """Return which of some terms are worth a look at a point, and those that its residuals suggest."""
-    found = [term for term in terms if term.kind not in ("unit", "swapped", *CLOCK_KINDS)]
+    found = [term for term in terms if term.kind not in (*RANKED_BY_RESIDUALS, *CLOCK_KINDS)]
+    found += _of_inputs(problem, linear, terms)
     found += _swapped(problem, linear, terms)
     found += [_from_best_size(problem, linear, term) for term in terms if term.kind in CLOCK_KINDS]
     for name in problem.channels:
@@ -104,9 +109,33 @@ def _of_channel(problem: Problem, linear: Linear, name: str, own: list[Term]) ->
         yield from _from_some_time(each, term, e, simulated, used, level, turn)
 
 
+def _of_inputs(problem: Problem, linear: Linear, terms: list[Term]) -> Iterator[Term]:
+    """Yield the error of each input with which the simulation leaves least, if that is less; none where the simulation
+    is near.
+    """
+    levels = problem.levels(linear.terms)
+    left = {name: _log_left(problem, name, linear.terms, linear.e[name]) for name in problem.channels}
+    if all(each < 2.0 * np.log(OFF_LEVELS * levels[name]) for name, each in left.items()):
+        return
+    best: dict[tuple[str, str], tuple[float, Term]] = {}
+    for term in (term for term in terms if term.kind in ("input", "exchanged")):
+        there = with_term(linear.terms, term)
+        found, valid = problem.residuals(there, linear.entries, [linear.x])
+        total = (
+            sum(_log_left(problem, name, there, e[:, 0]) for name, e in found.items()) if valid[0] else np.inf
+        )
+        best[term.slot] = min(best.get(term.slot, (np.inf, term)), (total, term), key=lambda pair: pair[0])
+    yield from (term for total, term in best.values() if total < sum(left.values()))
+
+
+def _log_left(problem: Problem, name: str, terms: Terms, e: np.ndarray) -> float:
+    """Return the log of the mean square of residuals of a channel (m,)."""
+    return float(np.log(np.mean(e[problem.used(name, terms)] ** 2)))
+
+
 def _swapped(problem: Problem, linear: Linear, terms: list[Term]) -> Iterator[Term]:
     """Yield pairs of channels that are closer to the simulation of each other than to their own."""
-    for term in (term for term in terms if term.partner):
+    for term in (term for term in terms if term.kind == "swapped"):
         pair = (term.target, term.partner)
         if _left(problem, linear, pair, with_term(linear.terms, term)) < _left(
             problem, linear, pair, linear.terms

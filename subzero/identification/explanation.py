@@ -8,6 +8,7 @@ sentence.
     drift                of a channel, a line in time
     delay, rate          another clock, of a channel or of all of them: late or early, fast or slow
     swapped              two channels have each other's readings
+    input, exchanged     an input is recorded with the other sign or in another unit; two have each other's columns
     stuck                a run of equal readings says nothing
 """
 
@@ -114,9 +115,9 @@ class Term:
     Attributes:
         id: such as "overflow", "overflow@12", "scale:depth", "unit:depth".
         sentence: what it says, in words.
-        kind: cause, tolerances, offset, scale, affine, unit, drift, delay, rate, swapped, stuck.
-        target: the cause, or the channel.
-        partner: the other channel of two that are swapped.
+        kind: cause, tolerances, offset, scale, affine, unit, drift, delay, rate, swapped, stuck, input, exchanged.
+        target: the cause, the channel, or the input.
+        partner: the other one of two that are swapped or exchanged.
         odds: prior odds that it holds.
         begins: time from which it holds; −∞ throughout. [s]
         ends: time until which it holds. [s]
@@ -271,6 +272,27 @@ def data_terms(model: Model) -> list[Term]:
             f"swapped:{a}/{b}",
             f"{a} and {b} have each other's readings",
             "swapped",
+            a,
+            odds / len(pairs),
+            partner=b,
+        )
+        for a, b in pairs
+    ]
+
+
+def input_terms(model: Model) -> list[Term]:
+    """Return terms of the errors that the inputs of a record may have."""
+    odds, pairs = PRIOR_DATA / max(len(model.inputs), 1), list(combinations(model.inputs, 2))
+    units = [
+        Term(f"input:{name}", f"the input {name}: {words}", "input", name, odds / len(KNOWN), factor=factor)
+        for name in model.inputs
+        for factor, _, words in KNOWN
+    ]
+    return units + [
+        Term(
+            f"exchanged:{a}/{b}",
+            f"the inputs {a} and {b} have each other's columns",
+            "exchanged",
             a,
             odds / len(pairs),
             partner=b,

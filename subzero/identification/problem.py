@@ -240,6 +240,11 @@ class Problem:
         return {**own, CLOCK: float(np.median(np.diff(self.records[0].time)))}
 
     @cached_property
+    def moving_inputs(self) -> set[str]:
+        """Inputs that change within a record."""
+        return {name for each in self.inputs for name, values in each.items() if np.ptp(values) > 0.0}
+
+    @cached_property
     def _longest(self) -> float:
         """Duration of the longest record. [s]"""
         return max(float(np.ptp(record.time)) for record in self.records)
@@ -280,13 +285,16 @@ class Problem:
         return replace(entry, centre=self.fixed[entry.identity], sd=FIXED * entry.sd)
 
     def _readings_of(
-        self, k: int, entries: Sequence[Entry], sets: Sequence[np.ndarray], *, must: bool
+        self, k: int, terms: Terms, entries: Sequence[Entry], sets: Sequence[np.ndarray], *, must: bool
     ) -> list[dict[str, np.ndarray] | None]:
         """Return readings of record k with sets of entries; only what moves an entry of its own is asked for."""
+        wrong = _wrong_inputs(terms)
         own = [i for i, entry in enumerate(entries) if _moves(entry, k)]
         mine = [entries[i] for i in own]
         keys = [x[own].tobytes() for x in sets]
-        new = {key: self._asked(k, mine, x[own]) for key, x in zip(keys, sets, strict=True)}
+        new = {
+            key: self._asked(k, mine, x[own])._replace(wrong=wrong) for key, x in zip(keys, sets, strict=True)
+        }
         found = dict(zip(new, self.runs[k].readings(list(new.values()), must=must), strict=True))
         return [found[key] for key in keys]
 
@@ -312,7 +320,7 @@ class Problem:
         self, terms: Terms, entries: Sequence[Entry], sets: Sequence[np.ndarray], *, must: bool = False
     ) -> tuple[dict[str, np.ndarray], np.ndarray]:
         """Return channel → residuals (m, k) of k sets of entries, and which sets could be simulated (k,)."""
-        runs = [self._readings_of(k, entries, sets, must=must) for k in range(len(self.records))]
+        runs = [self._readings_of(k, terms, entries, sets, must=must) for k in range(len(self.records))]
         valid = np.array([all(of[j] is not None for of in runs) for j in range(len(sets))])
         found = {}
         for name, each in self.channels.items():
@@ -491,8 +499,16 @@ class Problem:
 
 def _column(name: str, terms: Terms) -> str:
     """Return the channel in whose column the readings of a channel are."""
-    pairs = [(term.target, term.partner) for term in terms if term.partner]
+    pairs = [(term.target, term.partner) for term in terms if term.kind == "swapped"]
     return next((b if name == a else a for a, b in pairs if name in (a, b)), name)
+
+
+def _wrong_inputs(terms: Terms) -> dict[str, tuple[str, float]]:
+    """Return input → column that holds it, and by which factor it is too large there."""
+    found = {term.target: (term.target, term.factor) for term in terms if term.kind == "input"}
+    for a, b in [(term.target, term.partner) for term in terms if term.kind == "exchanged"]:
+        found[a], found[b] = (b, found.get(a, (a, 1.0))[1]), (a, found.get(b, (b, 1.0))[1])
+    return found
 
 
 def _moves(entry: Entry, k: int) -> bool:

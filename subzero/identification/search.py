@@ -38,7 +38,7 @@ WITHIN = 5.0
 """Explanations within this of the best are expanded, too. [nats]"""
 WORTH, GROSS = 3.0, 100.0
 """A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one. [nats]"""
-GROSS_KINDS = ("unit", "affine", "swapped")
+GROSS_KINDS = ("unit", "affine", "swapped", "input", "exchanged")
 """Errors in the data that may be gross."""
 OF_MODEL = ("number", "start", "unknown")
 """Kinds of entries that every explanation has."""
@@ -53,7 +53,7 @@ Key = tuple[tuple[str, float, float], ...]
 def key(terms: Terms) -> Key:
     """Return what an explanation is: of terms that begin at some time, whatever that is."""
     return tuple(
-        (term.id, term.factor if term.kind == "unit" else 1.0, term.offset if term.kind == "unit" else 0.0)
+        (term.id, term.factor, term.offset) if term.kind in ("unit", "input") else (term.id, 1.0, 0.0)
         for term in terms
     )
 
@@ -63,9 +63,9 @@ def ids(terms: Terms) -> tuple[str, ...]:
     return tuple(term.id for term in terms)
 
 
-def swaps(terms: Terms) -> set[str]:
-    """Return which channels an explanation exchanges."""
-    return {term.id for term in terms if term.partner}
+def moving(terms: Terms) -> set[tuple[str, float]]:
+    """Return the terms by which the simulation has other inputs, or a channel other readings."""
+    return {(term.id, term.factor) for term in terms if term.kind in ("swapped", "input", "exchanged")}
 
 
 class _TimeOverError(Exception):
@@ -326,8 +326,8 @@ class Search:
             entry.identity: (value, i)
             for i, (entry, value) in enumerate(zip(base.entries, base.x.tolist(), strict=True))
         }
-        # Sensitivities are known where a channel has readings: exchanged ones have other gaps.
-        kept = set(known) if swaps(terms) == swaps(base.terms) else set()
+        # Sensitivities are known along one simulation, and where a channel has readings.
+        kept = set(known) if moving(terms) == moving(base.terms) else set()
         fresh = [i for i, entry in enumerate(entries) if entry.identity not in kept]
         old = [i for i, entry in enumerate(entries) if entry.identity in kept]
         x = np.array(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,10 +16,13 @@ KEPT = 2000
 
 
 class Asked(NamedTuple):
-    """A run: numbers by name, causes' numbers included, and unknown inputs at the times (n,)."""
+    """A run: numbers by name, causes' numbers included, unknown inputs at the times (n,), and inputs that are recorded
+    wrongly: input → column that holds it, and by which factor it is too large there.
+    """
 
     numbers: Mapping[str, float]
     unknown: Mapping[str, np.ndarray]
+    wrong: Mapping[str, tuple[str, float]] = MappingProxyType({})
 
     @property
     def key(self) -> tuple[Any, ...]:
@@ -26,6 +30,7 @@ class Asked(NamedTuple):
         return (
             tuple(self.numbers.values()),
             *(values.tobytes() for values in self.unknown.values()),
+            *self.wrong.items(),
         )
 
 
@@ -79,15 +84,18 @@ class Runs:
         return [self._checked(self._call(run.numbers, run.unknown, run), run, 0) for run in runs]
 
     def _batch(self, runs: Sequence[Asked]) -> list[dict[str, np.ndarray]]:
+        """Return the readings of runs with the same inputs."""
         numbers = {name: np.array([run.numbers[name] for run in runs]) for name in runs[0].numbers}
         unknown = {name: np.stack([run.unknown[name] for run in runs], axis=1) for name in runs[0].unknown}
         found = self._call(numbers, unknown, runs[0])
         return [self._checked(found, run, len(runs), k) for k, run in enumerate(runs)]
 
     def _call(self, numbers: Mapping[str, Any], unknown: Mapping[str, Any], run: Asked) -> Mapping[str, Any]:
-        inputs: dict[str, Any] = {
-            name: values[:, None] if self.model.batch else values for name, values in self.inputs.items()
-        }
+        inputs: dict[str, Any] = {}
+        for name in self.inputs:
+            column, factor = run.wrong.get(name, (name, 1.0))
+            values = self.inputs[column] / factor
+            inputs[name] = values[:, None] if self.model.batch else values
         for name, values in unknown.items():
             of = name.removeprefix(COMMAND)
             inputs[of] = inputs[of] + values if name.startswith(COMMAND) else values

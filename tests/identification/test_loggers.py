@@ -1,8 +1,9 @@
-"""What a logger does to its columns: two of them exchanged, and clocks that run fast.
+"""What a logger does to its columns: two of them exchanged, clocks that run fast, inputs in another unit.
 
 Verifies: both are named, alone and beside a cause; a swap also where the noise of the channels is not declared and one
 of them is in another unit as well; a clock of one channel, with times of its own or not, and that of all channels
-against the inputs, to 3 standard deviations. Columns that are in their places and clocks that run right are not named.
+against the inputs, to 3 standard deviations; inputs with the other sign, in another unit, or in each other's columns.
+Columns that are in their places and clocks that run right are not named.
 Truth is exact: a heated rod, its middle and its end are first-order lags, one behind the other, and a fast clock reads
 the exact solution at other times.
 """
@@ -18,13 +19,14 @@ NOISE = {"rod": 0.05, "middle": 0.03, "end": 0.02}
 
 
 def rod(p, u, t):
-    """Three first-order lags, exact for a power that is held."""
+    """Three first-order lags, exact for two powers that are held."""
     a, b, c = p["a"], 1.0 / 1.5, 1.0 / 2.0
-    A = np.array([[-a, 0.0, 0.0, p["gain"]], [b, -b, 0.0, 0.0], [0.0, c, -c, 0.0], [0.0] * 4])
+    A = np.zeros((5, 5))
+    A[0, [0, 3]], A[1, [0, 1, 4]], A[2, [1, 2]] = (-a, p["gain"]), (b, -b, 1.0), (c, -c)
     step, state, shown = expm(A * (t[1] - t[0])), np.zeros(3), []
-    for power in u["power"]:
+    for powers in np.column_stack([u["power"], u["second"]]):
         shown.append(state)
-        state = step[:3, :3] @ state + step[:3, 3] * power
+        state = step[:3, :3] @ state + step[:3, 3:] @ powers
     return dict(zip(NOISE, np.array(shown).T, strict=True))
 
 
@@ -32,7 +34,7 @@ def model(*, noise=True):
     return sd.Model(
         rod,
         channels={name: sd.Sensor(noise=level if noise else None, unit="K") for name, level in NOISE.items()},
-        inputs=["power"],
+        inputs=["power", "second"],
         parameters=[sd.Number("a", 1.0, tolerance=0.02), sd.Number("gain", 1.0, tolerance=0.02)],
         causes=[
             sd.Cause("loss", "the rod loses heat", changes={"a": 0.3}),
@@ -45,17 +47,23 @@ def model(*, noise=True):
 def record(seed=0, *, late=(), fast=0.0, own=False, samples=300, **numbers):
     """Return a record of a rod; the clocks of some channels are fast by a share, with times of their own or not."""
     rng = np.random.default_rng(seed)
-    power = np.repeat(rng.choice([-4.0, 0.0, 4.0, 8.0], samples // 20), 20)
+    power, second = (
+        np.repeat(rng.choice(levels, samples // 20), 20) for levels in ([-4.0, 0.0, 4.0, 8.0], [0.0, 2.0])
+    )
     time, parts = STEP * np.arange(samples), 10
     fine = STEP / parts * np.arange(samples * parts)
-    shown = rod({"a": 1.0, "gain": 1.0, **numbers}, {"power": np.repeat(power, parts)}, fine)
+    shown = rod(
+        {"a": 1.0, "gain": 1.0, **numbers},
+        {"power": np.repeat(power, parts), "second": np.repeat(second, parts)},
+        fine,
+    )
     columns = {
         name: np.interp(time / (1.0 + fast) if name in late else time, fine, values)
         + NOISE[name] * rng.standard_normal(samples)
         for name, values in shown.items()
     }
     times = {name: time.copy() for name in late} if own else {}
-    return sd.Record(time, {**columns, "power": power}, times=times)
+    return sd.Record(time, {**columns, "power": power, "second": second}, times=times)
 
 
 def swapped(given, a, b):
@@ -102,3 +110,19 @@ def test_a_clock_of_all_channels_that_runs_fast_against_the_inputs():
 def test_columns_in_their_places_and_right_clocks_are_not_named(seed):
     verdict = sd.diagnose(record(seed, late=("middle",), own=True), model())
     assert verdict.verdict == "nothing_wrong"
+
+
+@pytest.mark.parametrize("name, factor", [("power", -1.0), ("second", 1000.0), ("power", 1.0 / 60.0)])
+@pytest.mark.parametrize("noise", [True, False])
+def test_an_input_with_the_other_sign_or_in_another_unit(name, factor, noise):
+    given = record(6)
+    columns = {**given.columns, name: factor * given.columns[name]}
+    verdict = sd.diagnose(sd.Record(given.time, columns), model(noise=noise))
+    assert [each.id for each in verdict.named] == [f"input:{name}"]
+    assert verdict.named[0].estimates[0].value == pytest.approx(factor)
+
+
+def test_inputs_in_each_others_columns_beside_a_cause():
+    verdict = sd.diagnose(swapped(record(7, a=1.4), "power", "second"), model())
+    assert {each.id for each in verdict.named} == {"exchanged:power/second", "loss"}
+    assert verdict.named[0].sentence == "the inputs power and second have each other's columns"
