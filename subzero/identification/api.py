@@ -341,7 +341,8 @@ def _on_grid(record: Record, name: str) -> np.ndarray:
 def _visible_from(search: Search) -> dict[str, str]:
     """Return error or cause → the size from which on it would be seen, if nothing else is wrong.
 
-    The odds of a term with the prior N(0, s²) exceed SEEN_ODDS where x² ≥ 2 σ² (log(odds/prior odds) + log(s/σ)).
+    The odds of a term with the prior N(0, s²) exceed SEEN_ODDS where x² ≥ 2 σ² (log(odds/prior odds) + log(s/σ)), with
+    the tolerance of what it moves in σ, as that may explain as much without it.
     """
     base = search.fits[()].linear
     found: dict[str, str] = {}
@@ -364,7 +365,7 @@ def _sizes(problem: Problem, linear: Linear, term: Term) -> list[tuple[str, floa
     half = np.linalg.inv(np.tril(factor))
     variance = sd**2 * np.sum(half**2, axis=0)
     cause = next((cause for cause in problem.model.causes if cause.id == term.target), None)
-    found = []
+    found, usual = [], {entry.identity: entry.sd for entry in problem.entries(())}
     for i, entry in enumerate(linear.entries):
         mine = (
             entry.name == term.target and entry.kind in kinds_of(term)
@@ -373,7 +374,7 @@ def _sizes(problem: Problem, linear: Linear, term: Term) -> list[tuple[str, floa
         )
         if not mine:
             continue
-        data = 1.0 / max(1.0 / variance[i] - 1.0 / sd[i] ** 2, 1e-300)
+        data = 1.0 / max(1.0 / variance[i] - 1.0 / sd[i] ** 2, 1e-300) + usual.get(entry.identity, 0.0) ** 2
         log = math.log(SEEN_ODDS / term.odds) + 0.5 * math.log(max(sd[i] ** 2 / data, 1.0))
         size = math.sqrt(2.0 * data * log)
         unit = {"gain": " %", "rate": " %", "delay": " s"}.get(entry.kind, "")

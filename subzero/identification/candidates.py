@@ -12,7 +12,6 @@ import numpy as np
 
 from subzero.identification.explanation import (
     CLOCK,
-    CLOCKS,
     GAIN_SCALE,
     OFFSET_LEVELS,
     Term,
@@ -33,7 +32,7 @@ STUCK_LEVELS = 5.0
 """... while the simulation changes by so many levels of the sensor."""
 SAME_CLOCK = 0.1
 """Odds of a delay of a channel that has the times of the inputs, over those of one with a clock of its own. [-]"""
-CLOCK_KINDS = tuple(kind for kind, _ in CLOCKS)
+CLOCK_KINDS = ("delay", "rate")
 RANKED_BY_RESIDUALS = ("unit", "swapped", "input", "exchanged")
 """Kinds of errors that are worth a look only where the residuals are then smaller."""
 SIZES_TRIED = 4

@@ -6,7 +6,9 @@ sentence.
     tolerances           every parameter may move four times as far as its tolerance: a calibration, no cause
     data error           y = a + b x of a channel, with free a and b or at known values, throughout or from a time on
     drift                of a channel, a line in time
-    delay, rate          another clock, of a channel or of all of them: late or early, fast or slow
+    delay                another clock, of a channel or of all of them
+    rate                 a clock of all channels that runs fast or slow; of one channel, an error of the model's speed
+                         looks the same, and would be named
     swapped              two channels have each other's readings
     input, exchanged     an input is recorded with the other sign or in another unit; two have each other's columns
     stuck                a run of equal readings says nothing
@@ -47,8 +49,6 @@ ONSET_ODDS = 0.2
 ONSET_SHARES = tuple(np.arange(0.1, 0.95, 0.1).tolist())
 """Where a search for an onset begins, over the duration of a record. [-]"""
 
-CLOCKS = (("delay", "is late or early"), ("rate", "runs fast or slow"))
-"""Errors of a clock."""
 KNOWN: tuple[tuple[float, float, str], ...] = (
     (-1.0, 0.0, "the other sign"),
     (180.0 / math.pi, 0.0, "degrees for radians"),
@@ -243,7 +243,7 @@ def data_terms(model: Model) -> list[Term]:
             other for other in model.channels.values() if sensor.logger and other.logger == sensor.logger
         ]
         if len(sharing) < 2:  # channels of one logger have one clock
-            soft += [(kind, words + " against the inputs") for kind, words in CLOCKS]
+            soft.append(("delay", "is late or early against the inputs"))
         found += [
             Term(f"{kind}:{name}", f"{name} {words}", kind, name, odds / len(soft)) for kind, words in soft
         ]

@@ -103,9 +103,13 @@ def level_of(values: np.ndarray, resolution: float) -> float:
     """Return the level of a sensor as its readings (n,) show it: from their second differences, which a slow signal
     hardly has; at least that of its rounding.
 
-    The second difference of white noise has √6 times its standard deviation.
+    The second difference of white noise has √6 times its standard deviation. Readings that are not rounded and yet
+    equal in a row are those of a sensor that stands still, and show no noise.
     """
     seen = values[np.isfinite(values)]
+    if resolution == 0.0 and seen.size > 4:
+        moving = middle_of_equal(seen)
+        seen = seen[moving] if moving.sum() > 4 else seen
     rough = MEDIAN_TO_SD * float(np.median(np.abs(np.diff(seen, 2)))) / np.sqrt(6.0) if seen.size > 4 else 0.0
     floor = FLOOR_SHARE * float(np.ptp(seen)) if seen.size else 0.0
     return max(rough, resolution / np.sqrt(12.0), floor, np.finfo(float).tiny ** 0.25)

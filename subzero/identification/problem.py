@@ -35,6 +35,8 @@ RARE = 0.05
 """Largest share of a channel's readings that are set aside as outliers: more of them say something. [-]"""
 FREE_TURNS = 2.0
 """So many turns readings of an angle may span besides twice the turns of the nominal model: its logger wraps it. [-]"""
+FOLLOWS = 0.25
+"""Residuals of an angle that change by less between neighbours, in turns, are followed beyond half a turn. [-]"""
 MAX_KNOTS = 200
 """Most knots of one unknown input in one record: its time is lengthened where there would be more."""
 FIXED = 1e-6
@@ -198,6 +200,8 @@ class Problem:
         turn, each = self.model.channels[name].turn, self.channels[name]
         if not turn or abs(factor) == 1.0:
             return True
+        if (np.abs(np.diff(each.values[each.used])) > 0.5 * turn).any():
+            return False  # the logger wraps what it takes for an angle
         having = [(k, record) for k, record in enumerate(self.records) if name in record.columns]
         most = FREE_TURNS * turn + 2.0 * float(np.ptp(self._at_nominal(name, having)))
         return not float(np.ptp(each.values[each.used])) > most * abs(factor)
@@ -329,7 +333,8 @@ class Problem:
             for j in np.flatnonzero(valid).tolist():
                 simulated = self._simulated(name, [of[j] or {} for of in runs], entries, sets[j])
                 shown = self.shown(name, terms, entries, sets[j], simulated)
-                columns[:, j] = self._wrapped(name, recorded - np.clip(shown, sensor.low, sensor.high))
+                e = recorded - np.clip(shown, sensor.low, sensor.high)
+                columns[:, j] = self._turned(name, terms, e)
             found[name] = columns
         return found, valid
 
@@ -485,6 +490,21 @@ class Problem:
     def _wrapped(self, name: str, values: np.ndarray) -> np.ndarray:
         turn = self.model.channels[name].turn
         return values - turn * np.rint(values / turn) if turn else values
+
+    def _turned(self, name: str, terms: Terms, e: np.ndarray) -> np.ndarray:
+        """Return residuals (m,) of an angle: continuous from the first reading of each record on, which is less than
+        half a turn off, where the readings follow the angle; else all less than half a turn.
+        """
+        turn = self.model.channels[name].turn
+        if not turn:
+            return e
+        found, of = self._wrapped(name, e), self.channels[name].record
+        for record in np.unique(of).tolist():
+            at = np.flatnonzero(self.used(name, terms) & (of == record))
+            steps = self._wrapped(name, np.diff(e[at]))
+            if at.size and not (np.abs(steps) > FOLLOWS * turn).any():
+                found[at] += np.concatenate([[0.0], np.cumsum(steps)]) - (found[at] - found[at[0]])
+        return found
 
     def _where(self, each: Readings, term: Term) -> np.ndarray:
         of = np.ones(each.time.size, dtype=bool) if term.record < 0 else each.record == term.record

@@ -42,8 +42,10 @@ GROSS_KINDS = ("unit", "affine", "swapped", "input", "exchanged")
 """Errors in the data that may be gross."""
 OF_MODEL = ("number", "start", "unknown")
 """Kinds of entries that every explanation has."""
-TWINS = ("offset", "scale", "affine", "delay", "rate")
+TWINS = ("offset", "scale", "affine", "delay")
 """Errors that another channel of the unit may have in the place of the first one."""
+FEW_CAUSES = 12
+"""So many causes are all fitted by themselves, whatever their rank."""
 MOST_FITS = 60
 """The search ends after so many fits, and says so."""
 
@@ -138,11 +140,26 @@ class Search:
             self._fit(self._greedy(nominal))
         else:
             self._fit(linearised(problem, fitted.terms, fitted.entries, fitted.x, fitted.linear.levels))
+        for base in {key(each.terms): each for each in (self.fits[()], self.ranked()[0])}.values():
+            self._fit_single_causes(base)
         while (base := self._next()) is not None:
             if len(self.fits) >= MOST_FITS:
                 self.complete = False
                 return
             self._expand(base)
+
+    def _fit_single_causes(self, base: Fit) -> None:
+        """Fit each cause with a base, if there are few: a rank is of the linear problem, which may be blind to what a
+        cause does when it is large, and to its twin.
+        """
+        causes: dict[str, list[Term]] = {}
+        for term in self._terms:
+            if term.kind == "cause" and math.isinf(term.begins):
+                causes.setdefault(term.id, []).append(term)
+        for sizes in causes.values() if len(causes) <= FEW_CAUSES else ():
+            made = [self.there(base.linear, with_term(base.terms, term), term) for term in sizes]
+            if found := [linear for linear in made if linear]:
+                self._fit(max(found, key=self._linear_score))
 
     def _next(self) -> Fit | None:
         """Return the best explanation that was neither expanded nor left for a better one, if it is near the best of

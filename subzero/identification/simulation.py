@@ -128,7 +128,8 @@ class Runs:
                     f"{self.source}: the model returns {values.shape} readings of {name!r} for {shape}, with "
                     f"{shown(run.numbers)}."
                 )
-            readings[name] = values[:, k].copy() if batch else values.copy()
+            own, turn = values[:, k] if batch else values, self.model.channels[name].turn
+            readings[name] = np.unwrap(own, period=turn) if turn else own.copy()  # to be interpolated
         return readings
 
     def check(self, run: Asked) -> None:
