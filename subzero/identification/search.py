@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from subzero.identification.candidates import declared, suggested
-from subzero.identification.explanation import AFFINE, Entry, Term, Terms, log_prior, with_term, without
+from subzero.identification.explanation import Entry, Term, Terms, log_prior, with_term, without
 from subzero.identification.fit import (
     Fit,
     Linear,
@@ -115,11 +115,12 @@ class Search:
 
     def log_unseen(self) -> float:
         """Return the log of the sum of the scores of the best explanation with one term more, of those that were not
-        fitted: records that do not show a cause do not exclude it.
+        worth a fit: records that do not show a cause do not exclude it.
         """
         best = self.ranked()[0]
         ranks = self.ranks.get(key(best.terms), {})
-        scores = [min(score, self.score(best)) for name, score in ranks.items() if name not in self.fits]
+        least = self.score(best) - WORTH
+        scores = [score for name, score in ranks.items() if name not in self.fits and score < least]
         return float(logsumexp(scores)) if scores else -math.inf
 
     def run(self) -> None:
@@ -211,14 +212,15 @@ class Search:
         return bare is not None and self._own_score(bare) < self.score(base) - GROSS
 
     def _replacements(self, base: Fit, term: Term) -> list[Fit]:
-        """Return the fits of the best explanations with another unit, or a regression, of a channel in the place of a
-        gross error, from the point where the fit with that ends.
+        """Return the fits of the best explanations with another gross error in the place of one: a unit or a regression
+        of the same channel, or any other that brings the readings closer, from the point where the fit with that ends.
         """
         bare = self.there(base.linear, without(base.terms, term))
-        if bare is None or term.slot[0] != AFFINE:
+        if bare is None:
             return []
-        units = [each for each in self._terms if each.kind == "unit" and each.target == term.target]
-        other = [each for each in suggested(self.problem, bare, units) if each.kind == "affine"]
+        gross = [each for each in self._terms if each.kind in GROSS_KINDS]
+        units = [each for each in gross if each.kind == "unit" and each.target == term.target]
+        other = [each for each in suggested(self.problem, bare, gross) if each.kind in GROSS_KINDS]
         made = [self.there(bare, with_term(bare.terms, each)) for each in (*units, *other)]
         found = [self._with_own_noise(linear) for linear in made if linear]
         ranked = self._distinct(sorted(found, key=lambda pair: -pair[0]))[:FITTED]

@@ -65,14 +65,20 @@ def test_a_second_mass_that_no_term_holds_names_nothing(second, unknown):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    "factor, words", [(1.0 / 0.3048, "feet"), (-1.0, "other sign"), (1000.0, "thousand times too large")]
-)
+@pytest.mark.parametrize("factor, words", [(1.0 / 0.3048, "feet"), (1000.0, "thousand times too large")])
 def test_a_unit_is_named_whatever_the_parameters_would_bend(factor, words):
     seen = record(1)
     verdict = sd.diagnose(changed(seen, x=factor * seen.columns["x"]), model())
     assert [each.id for each in verdict.named] == ["unit:x"]
     assert words in verdict.named[0].sentence
+
+
+def test_of_a_linear_model_the_sign_of_the_readings_or_of_the_input_is_not_decided():
+    seen = record(1)
+    verdict = sd.diagnose(changed(seen, x=-seen.columns["x"]), model())
+    assert verdict.verdict == "undecided"
+    likely = {name.partition(" (")[0]: p for name, p in verdict.explanations.items() if p > 0.2}
+    assert set(likely) == {"unit:x", "input:force"}
 
 
 def test_a_search_ends_where_a_unit_and_a_regression_are_nearly_as_probable():
@@ -81,8 +87,9 @@ def test_a_search_ends_where_a_unit_and_a_regression_are_nearly_as_probable():
     one = model(causes=("stiffness", "cubic"), unknown=False, channels={"x": sensor})
     verdict = sd.diagnose(changed(seen, x=-seen.columns["x"]), one)
     assert verdict.complete
-    assert [each.id for each in verdict.named] == ["unit:x"]
+    assert verdict.verdict == "undecided"  # the input may have the other sign as well
     assert "affine:x" in verdict.explanations
+    assert any(name.startswith("unit:x") for name in verdict.explanations)
 
 
 @pytest.mark.long
@@ -135,7 +142,7 @@ def test_a_command_that_may_be_off_may_as_well_be_what_is_late():
 def test_what_is_named_is_the_same_for_a_function_of_one_set():
     batch = sd.diagnose(record(0, k=4.6), model())
     single = sd.diagnose(record(0, k=4.6), replace(model(), batch=False))
-    assert batch.to_json() == single.to_json()
+    assert str(batch) == str(single)
 
 
 @pytest.mark.long
