@@ -341,8 +341,8 @@ def _on_grid(record: Record, name: str) -> np.ndarray:
 def _visible_from(search: Search) -> dict[str, str]:
     """Return error or cause → the size from which on it would be seen, if nothing else is wrong.
 
-    The odds of a term with the prior N(0, s²) exceed SEEN_ODDS where x² ≥ 2 σ² (log(odds/prior odds) + log(s/σ)), with
-    the tolerance of what it moves in σ, as that may explain as much without it.
+    With the prior N(0, τ²) of a number, N(0, τ² + s²) with the term, and σ of what the readings say of it, the log odds
+    of the term grow as ½ x² (1/(σ² + τ²) − 1/(σ² + τ² + s²)).
     """
     base = search.fits[()].linear
     found: dict[str, str] = {}
@@ -372,11 +372,13 @@ def _sizes(problem: Problem, linear: Linear, term: Term) -> list[tuple[str, floa
             if term.is_data_error
             else bool(cause) and entry.name in (cause.changes if cause else ())
         )
-        if not mine:
+        before = usual.get(entry.identity, 0.0)
+        if not mine or before >= sd[i]:
             continue
-        data = 1.0 / max(1.0 / variance[i] - 1.0 / sd[i] ** 2, 1e-300) + usual.get(entry.identity, 0.0) ** 2
-        log = math.log(SEEN_ODDS / term.odds) + 0.5 * math.log(max(sd[i] ** 2 / data, 1.0))
-        size = math.sqrt(2.0 * data * log)
+        seen = 1.0 / max(1.0 / variance[i] - 1.0 / sd[i] ** 2, 1e-300)
+        narrow, wide = seen + before**2, seen + sd[i] ** 2
+        log = math.log(SEEN_ODDS / term.odds) + 0.5 * math.log(wide / narrow)
+        size = math.sqrt(2.0 * log / (1.0 / narrow - 1.0 / wide))
         unit = {"gain": " %", "rate": " %", "delay": " s"}.get(entry.kind, "")
         found.append((term.id, 100.0 * size if unit == " %" else size, unit))
     return found

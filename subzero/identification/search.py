@@ -141,8 +141,8 @@ class Search:
             self._fit(self._greedy(nominal))
         else:
             self._fit(linearised(problem, fitted.terms, fitted.entries, fitted.x, fitted.linear.levels))
-        for base in {key(each.terms): each for each in (self.fits[()], self.ranked()[0])}.values():
-            self._fit_single_causes(base)
+        for first in {key(each.terms): each for each in (self.fits[()], self.ranked()[0])}.values():
+            self._fit_single_causes(first)
         while (base := self._next()) is not None:
             if len(self.fits) >= MOST_FITS:
                 self.complete = False

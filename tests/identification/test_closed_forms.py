@@ -46,6 +46,25 @@ def covariance(noise, time):
     )
 
 
+def test_what_would_be_seen_is_the_size_at_which_the_odds_of_two_gaussians_are_nine():
+    """A constant y = a, of which the mean of n readings says σ/√n; the cause moves a beyond its tolerance."""
+    noise, count, tolerance, size = 0.1, 200, 0.05, 0.5
+    time = np.arange(count) * 1.0
+    model = sd.Model(
+        lambda p, u, t: {"y": p["a"] + 0.0 * t},
+        {"y": sd.Sensor(noise=noise, resolution=0.0, spread=1e-3)},
+        parameters=[sd.Number("a", 0.0, tolerance=tolerance)],
+        causes=[sd.Cause("shift", "a is off", changes={"a": size})],
+    )
+    y = noise * np.random.default_rng(0).standard_normal(count)
+    verdict = sd.diagnose(sd.Record(time, {"y": y - y.mean()}), model)
+    without = noise**2 / count + tolerance**2
+    having = without + size**2
+    odds = 9.0 / 0.05  # the prior odds of a single cause
+    x = np.sqrt(2.0 * np.log(odds * np.sqrt(having / without)) / (1.0 / without - 1.0 / having))
+    assert float(verdict.visible_from["shift"]) == pytest.approx(x, rel=0.03)
+
+
 def test_the_filter_whitens_as_the_dense_covariance_does():
     rng = np.random.default_rng(1)
     time, noise = np.cumsum(rng.uniform(0.05, 0.4, 60)), Noise(0.3, 0.7, 1.5)

@@ -147,3 +147,11 @@ def test_a_channel_that_always_holds_its_readings_is_not_stuck():
     columns = dict(made.columns)
     columns["speed"] = np.repeat(columns["speed"][6::12], 12)
     assert sd.diagnose(sd.Record(made.time, columns), model()).verdict == "nothing_wrong"
+
+
+def test_a_sensor_that_stands_still_for_most_of_a_record_shows_its_noise_where_it_moves():
+    made = record(seed=5)
+    speed = made.columns["speed"].copy()
+    speed[120:] = speed[120]
+    verdict = sd.diagnose(sd.Record(made.time, {**made.columns, "speed": speed}), model(noise=False))
+    assert [each.id for each in verdict.named] == ["stuck:speed@0"]
