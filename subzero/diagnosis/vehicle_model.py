@@ -15,6 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+import scenarios
+from scenarios.steps import held
 from subzero import identification as general
 from subzero.channels import BY_NAME, HEADING
 from subzero.diagnosis.hypothesis.catalogue import SPECS, START, catalogue, with_own
@@ -26,6 +28,7 @@ from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference.simulator import Stop, Track, economical, read, simulate_on, with_stops
 from subzero.errors import UserError
 from subzero.external_force import AXES, MissingForce
+from subzero.records.consistency import REPORTED_COMMANDS
 
 OF_ANY_MODEL = ("sensor_bias", "sensor_scale", "clock_offset")
 """Effects that `Sensor` and errors in the data say."""
@@ -59,12 +62,14 @@ def vehicle_model(
     settings = [economical(each.setting, float(each.record.time[-1])) for each in logged]
     channels = list(dict.fromkeys(name for each in logged for name in each.record.values if name in SPECS))
     effects = _effects(settings[0], channels)
+    commands = [_commands(setting) for setting in settings]
+    inputs = list(REPORTED_COMMANDS) if all(values is not None for values in commands) else []
     noise = {name: level for each in logged for name, level in each.noise.items()}
     trusted = {name for each in logged for name in each.trusted}
     model = general.Model(
         _simulate(settings, effects, channels),
         {name: _sensor(name, noise, trusted) for name in channels},
-        inputs=[TRIAL],
+        inputs=[TRIAL, *inputs],
         parameters=[*_numbers(effects.values(), general.Number), *_numbers(START, general.Start)],
         causes=[_cause(effect) for effect in effects.values()],
         unknown=[general.Unknown(axis, AXIS_SIZES[axis], AXIS_TIME_S) for axis in axes],
@@ -72,12 +77,52 @@ def vehicle_model(
     records = [
         general.Record(
             each.record.time,
-            {TRIAL: np.full(each.record.time.size, float(k)), **each.record.values},
+            {
+                TRIAL: np.full(each.record.time.size, float(k)),
+                **{name: each.record.values[name] for name in channels if name in each.record.values},
+                **(dict(zip(inputs, _held(setting, each.record.time), strict=True)) if inputs else {}),
+            },
             name=each.name,
         )
-        for k, each in enumerate(logged)
+        for k, (each, setting) in enumerate(zip(logged, settings, strict=True))
     ]
     return model, records
+
+
+def _commands(setting: Setting) -> scenarios.Commands | None:
+    """Return the commands of propeller, rudder and planes; None of a trial that has others."""
+    commands = setting.trial.commands
+    return commands if commands is not None and commands.values.shape[1] == len(REPORTED_COMMANDS) else None
+
+
+def _held(setting: Setting, time: np.ndarray) -> np.ndarray:
+    """Return the commands of a trial at some times (4, n)."""
+    commands = setting.trial.commands
+    assert commands is not None
+    return np.array([held(commands.time, column, time) for column in commands.values.T])
+
+
+def _with_commands(
+    setting: Setting, u: Mapping[str, np.ndarray], t: np.ndarray
+) -> tuple[Setting, tuple[float, ...]]:
+    """Return a setting with the commands that the inputs say, which are those of the trial, or one of them times a
+    factor; and what makes it another simulation.
+    """
+    own = _held(setting, t)
+    given = np.array([u[name] for name in REPORTED_COMMANDS])
+    if np.array_equal(own, given):
+        return setting, ()
+    size = np.einsum("kn,kn->k", own, own)
+    size[size == 0.0] = np.inf
+    factors = (given @ own.T) / size  # of each input, by which it is each command of the trial
+    misses = np.abs(given[:, None, :] - factors[:, :, None] * own).max(axis=2)
+    source = np.argmin(misses, axis=1)
+    factor = factors[np.arange(source.size), source]
+    commands = setting.trial.commands
+    assert commands is not None
+    changed = replace(commands, values=commands.values[:, source] * factor)
+    key = (*source.astype(float).tolist(), *factor.tolist())
+    return replace(setting, trial=replace(setting.trial, commands=changed)), key
 
 
 def _effects(setting: Setting, channels: Sequence[str]) -> dict[str, Effect]:
@@ -129,7 +174,7 @@ def _simulate(
     settings: Sequence[Setting], effects: Mapping[str, Effect], channels: Sequence[str]
 ) -> general.model.Simulate:
     """Return the function of the model: what the sensors of a trial would show."""
-    kept = _Simulations()
+    kept, commanded = _Simulations(), all(_commands(setting) is not None for setting in settings)
 
     def simulate(p: Mapping[str, Any], u: Mapping[str, Any], t: np.ndarray) -> dict[str, np.ndarray]:
         trial, named = int(u[TRIAL][0]), effects.values()
@@ -144,15 +189,17 @@ def _simulate(
             for effect in named
             if effect.sudden
         }
+        given, key = _with_commands(settings[trial], u, t) if commanded else (settings[trial], ())
         force = np.column_stack([u.get(axis, np.zeros(t.size)) for axis in AXES])
         asked = _Asked(
             trial,
-            {effect.id: tuple(whole[effect.id]) for effect in (*named, *START) if effect.slot != "sensors"},
+            {effect.id: tuple(whole[effect.id]) for effect in (*named, *START) if effect.slot != "sensors"}
+            | {"commands": key},
             {id: (since, *values) for id, (since, values) in late.items() if any(values)},
             t,
             force,
         )
-        setting = settings[trial]
+        setting = given
         for effect in (*named, *START):
             if any(whole[effect.id]):
                 setting = effect.apply(setting, *whole[effect.id])

@@ -144,8 +144,12 @@ def _gains(problem: Problem, best: Fit, tried: Sequence[Term], folds: Sequence[F
     }
 
 
-def _predicted(problem: Problem, best: Fit, terms: Terms, folds: Sequence[Fold]) -> list[np.ndarray]:
-    """Return squared residuals of predictions, in levels of the sensors: one row of time for each channel of a fold."""
+Squares = tuple[np.ndarray, np.ndarray]
+"""Squared residuals of a channel (m,), in levels of its sensor, and which of its readings they are of (n,)."""
+
+
+def _predicted(problem: Problem, best: Fit, terms: Terms, folds: Sequence[Fold]) -> list[Squares]:
+    """Return the squares of predictions: for each channel of a fold."""
     squares, levels = [], problem.levels(best.terms)
     for fold in folds:
         here = tuple(replace(term, record=-1) for term in terms)
@@ -156,7 +160,7 @@ def _predicted(problem: Problem, best: Fit, terms: Terms, folds: Sequence[Fold])
         for name, e in predicted.linear.e.items():
             kept = there.used(name, here) & (there.channels[name].time > fold.begin)
             if name in levels and kept.any():
-                squares.append((e[kept] / levels[name]) ** 2)
+                squares.append(((e[kept] / levels[name]) ** 2, kept))
     return squares
 
 
@@ -165,8 +169,19 @@ def _shared(best: Fit) -> dict[Entry, float]:
     return {entry: value for entry, value in best.values.items() if entry.record < 0}
 
 
-def _gain(having: Sequence[np.ndarray], lacking: Sequence[np.ndarray], fold: Fold) -> Gain:
+def _of_both(
+    having: Sequence[Squares], lacking: Sequence[Squares]
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return the squares of readings that both predictions are of."""
+    pairs = [
+        ((a, kept), (b, other), kept & other) for (a, kept), (b, other) in zip(having, lacking, strict=True)
+    ]
+    return [a[both[kept]] for (a, kept), _, both in pairs], [b[both[other]] for _, (b, other), both in pairs]
+
+
+def _gain(with_term: Sequence[Squares], without_term: Sequence[Squares], fold: Fold) -> Gain:
     """Return the gain between squared residuals with and without a term, with its bootstrap interval."""
+    having, lacking = _of_both(with_term, without_term)
     better = np.concatenate([b - a for a, b in zip(having, lacking, strict=True)])
     blocks = np.array([np.mean(part) for part in np.array_split(better, min(BLOCKS, better.size))])
     draws = np.random.default_rng(0).integers(0, blocks.size, (DRAWS, blocks.size))

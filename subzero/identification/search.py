@@ -39,7 +39,7 @@ WITHIN = 5.0
 WORTH, GROSS = 3.0, 100.0
 """A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one. [nats]"""
 GROSS_KINDS = ("unit", "affine", "swapped", "input", "exchanged")
-"""Errors in the data that may be gross."""
+"""Errors in the data that may be gross, as those that begin in mid-record may."""
 OF_MODEL = ("number", "start", "unknown")
 """Kinds of entries that every explanation has."""
 TWINS = ("offset", "scale", "affine", "delay")
@@ -63,6 +63,17 @@ def key(terms: Terms) -> Key:
 def ids(terms: Terms) -> tuple[str, ...]:
     """Return what an explanation is, whatever the known units of its channels are."""
     return tuple(term.id for term in terms)
+
+
+def _is_gross_kind(term: Term) -> bool:
+    """Return whether an error in the data may be a gross one: no cause does what it does."""
+    return term.kind in GROSS_KINDS or (term.is_data_error and math.isfinite(term.begins))
+
+
+def _new(base: Linear, linear: Linear) -> Term:
+    """Return the term that one explanation has and another has not."""
+    have = {term.id for term in base.terms}
+    return next((term for term in linear.terms if term.id not in have), linear.terms[-1])
 
 
 def moving(terms: Terms) -> set[tuple[str, float]]:
@@ -206,7 +217,7 @@ class Search:
         """Return whether a term is a unit or a regression without which the linear problem is far less probable: no
         cause does what it does, but a cause may do what an offset, a scale, a drift or a delay does.
         """
-        if term.kind not in GROSS_KINDS:
+        if not _is_gross_kind(term):
             return False
         bare = self.there(base.linear, without(base.terms, term))
         return bare is not None and self._own_score(bare) < self.score(base) - GROSS
@@ -218,9 +229,9 @@ class Search:
         bare = self.there(base.linear, without(base.terms, term))
         if bare is None:
             return []
-        gross = [each for each in self._terms if each.kind in GROSS_KINDS]
-        units = [each for each in gross if each.kind == "unit" and each.target == term.target]
-        other = [each for each in suggested(self.problem, bare, gross) if each.kind in GROSS_KINDS]
+        errors = [each for each in self._terms if each.kind in (*GROSS_KINDS, "offset")]
+        units = [each for each in errors if each.kind == "unit" and each.target == term.target]
+        other = [each for each in suggested(self.problem, bare, errors) if _is_gross_kind(each)]
         made = [self.there(bare, with_term(bare.terms, each)) for each in (*units, *other)]
         found = [self._with_own_noise(linear) for linear in made if linear]
         ranked = self._distinct(sorted(found, key=lambda pair: -pair[0]))[:FITTED]
@@ -281,9 +292,9 @@ class Search:
         other, as long as each is a gross error.
         """
         here, before = nominal, self._linear_score(nominal)
-        errors = [term for term in self._terms if term.kind in GROSS_KINDS]
+        errors = [term for term in self._terms if term.kind in (*GROSS_KINDS, "offset")]
         while len(here.terms) < MOST_TERMS:
-            added = self._additions(here, errors)
+            added = [each for each in self._additions(here, errors) if _is_gross_kind(_new(here, each[1]))]
             if not added or added[0][0] < before + GROSS:
                 break
             before, here = added[0]

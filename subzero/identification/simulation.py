@@ -103,6 +103,9 @@ class Runs:
             with np.errstate(all="ignore"):
                 return self.model.simulate(nested(numbers), inputs, self.time)
         except Exception as error:
+            if run.wrong:  # inputs of another unit may be absurd, and a model may say so
+                sets = np.shape(next(iter(numbers.values()), 0.0))
+                return dict.fromkeys(self.model.channels, np.full((self.time.size, *sets), np.nan))
             raise ModelError(
                 f"{self.source}: the model raises {type(error).__name__}: {error}, with {shown(run.numbers)}."
             ) from error
