@@ -35,7 +35,7 @@ SAME_CLOCK = 0.1
 CLOCK_KINDS = ("delay", "rate")
 RANKED_BY_RESIDUALS = ("unit", "swapped", "input", "exchanged")
 """Kinds of errors that are worth a look only where the residuals are then smaller."""
-SIZES_TRIED = 4
+SIZES_TRIED = 8
 """Errors of a clock up to so many usual ones are tried, in steps of an eighth of one."""
 FEWEST_AFTER = 8
 """An error that begins in the middle of a record has so many readings before and after it."""

@@ -36,10 +36,12 @@ TUNED_WIDER = 10.0
 evidence on that channel. [-]"""
 GAIN_SCALE = 0.1
 """Usual error of the scale of a sensor (one standard deviation). [-]"""
-BEYOND, OFFSET_LEVELS, DELAY_INTERVALS, RATE_SCALE = 10.0, 30.0, 5.0, 0.03
+BEYOND, OFFSET_LEVELS, RATE_SCALE = 10.0, 30.0, 0.03
 """Usual error of an offset or a drift, in tolerances of the sensor's zero, or in its levels where none is declared; of
-a delay, in sampling intervals; of the rate of a clock. [-]"""
+the rate of a clock. [-]"""
 
+SAME_LOGGER = 0.1
+"""Odds of a delay of one channel of a logger, over those of a channel of its own. [-]"""
 PRIOR_CAUSE, MOST_LIKELY, PRIOR_TOLERANCES, PRIOR_DATA, PRIOR_NEXT_DATA = 0.5, 0.05, 0.1, 0.1, 0.3
 """Prior odds that any one cause acts, and most of a single one; that tolerances are too narrow; that the readings of a
 channel have any one error; and of such an error in a logger that has one already. [-]"""
@@ -71,6 +73,8 @@ KNOWN: tuple[tuple[float, float, str], ...] = (
     (math.pi / 30.0, 0.0, "rad/s for revolutions per minute"),
 )
 """Errors of a logger that people make: factor, offset in turns, words. Each is a peak of the prior."""
+OF_ACTUATORS = 5.0
+"""A smaller factor between an input and what it does may be the actuator's. [-]"""
 KNOWN_ANGLES: tuple[tuple[float, float, str], ...] = (
     (1.0, 0.25, "a quarter of a turn too large"),
     (1.0, -0.25, "a quarter of a turn too small"),
@@ -242,11 +246,14 @@ def data_terms(model: Model) -> list[Term]:
         sharing = [
             other for other in model.channels.values() if sensor.logger and other.logger == sensor.logger
         ]
-        if len(sharing) < 2:  # channels of one logger have one clock
-            soft.append(("delay", "is late or early against the inputs"))
         found += [
             Term(f"{kind}:{name}", f"{name} {words}", kind, name, odds / len(soft)) for kind, words in soft
         ]
+        # Channels of one logger have one clock, but one of them may have been kept back.
+        late = odds / (len(soft) + 1) * (SAME_LOGGER if len(sharing) > 1 else 1.0)
+        found.append(
+            Term(f"delay:{name}", f"{name} is late or early against the inputs", "delay", name, late)
+        )
         both = odds / len(soft) * PRIOR_NEXT_DATA / len(soft)  # an offset, and then an error of scale
         found.append(Term(f"affine:{name}", f"{name} has another scale and zero", "affine", name, both))
         found += [
@@ -283,10 +290,11 @@ def data_terms(model: Model) -> list[Term]:
 def input_terms(model: Model) -> list[Term]:
     """Return terms of the errors that the inputs of a record may have."""
     odds, pairs = PRIOR_DATA / max(len(model.inputs), 1), list(combinations(model.inputs, 2))
+    known = [(f, words) for f, _, words in KNOWN if f < 0.0 or max(f, 1.0 / f) > OF_ACTUATORS]
     units = [
-        Term(f"input:{name}", f"the input {name}: {words}", "input", name, odds / len(KNOWN), factor=factor)
+        Term(f"input:{name}", f"the input {name}: {words}", "input", name, odds / len(known), factor=factor)
         for name in model.inputs
-        for factor, _, words in KNOWN
+        for factor, words in known
     ]
     return units + [
         Term(
@@ -313,16 +321,14 @@ def from_time(term: Term, record: int, time: float, share: float) -> Term:
     )
 
 
-def entries_of(
-    terms: Terms, model: Model, levels: dict[str, float], intervals: dict[str, float]
-) -> list[Entry]:
+def entries_of(terms: Terms, model: Model, levels: dict[str, float], delays: dict[str, float]) -> list[Entry]:
     """Return the free numbers that terms bring, and those of the model with the prior that the terms leave them.
 
     Args:
         terms: of the explanation.
         model: whose parameters they are.
         levels: channel → level of its sensor. [unit]
-        intervals: channel → its sampling interval. [s]
+        delays: channel → usual size of a delay. [s]
     """
     found = [
         Entry(
@@ -341,7 +347,7 @@ def entries_of(
         if term.kind == "cause":
             found += _of_cause(causes[term.target], term)
     for name in levels:
-        found += _of_sensor(name, model, terms, levels[name], intervals[name])
+        found += _of_sensor(name, model, terms, levels[name], delays[name])
     return found
 
 
@@ -390,7 +396,7 @@ def kinds_of(term: Term) -> tuple[str, ...]:
     return ("step",) if term.kind == "offset" and math.isfinite(term.begins) else OF_TERM.get(term.kind, ())
 
 
-def _of_sensor(name: str, model: Model, terms: Terms, level: float, interval: float) -> list[Entry]:
+def _of_sensor(name: str, model: Model, terms: Terms, level: float, delay: float) -> list[Entry]:
     """Return the numbers of a sensor that are not fixed: within their tolerances, or free."""
     sensor = model.channels.get(name)
     usual = {"offset": sensor.zero, "gain": sensor.scale, "delay": sensor.late} if sensor else {}
@@ -401,7 +407,7 @@ def _of_sensor(name: str, model: Model, terms: Terms, level: float, interval: fl
         "step": off,
         "drift": off,
         "gain": GAIN_SCALE,
-        "delay": DELAY_INTERVALS * interval,
+        "delay": delay,
         "rate": RATE_SCALE,
     }
     spreads = {kind: math.hypot(usual.get(kind, 0.0), wide[kind] * (kind in free)) for kind in wide}

@@ -24,9 +24,11 @@ from subzero.identification.noise import (
 from subzero.identification.record import Record
 from subzero.identification.simulation import Asked, Runs
 
-STEP, STEP_DELAY = 0.1, 1e-3
+STEP, STEP_DELAY = 0.01, 1e-3
 """Step of a sensitivity, over the standard deviation of a number's prior; of a delay in sampling intervals, where a
 longer step would pass a corner of the simulation, which is interpolated between samples. [-]"""
+DELAY_INTERVALS, DELAY_SHARE = 5.0, 0.03
+"""Usual size of a delay, in sampling intervals, or over the duration of a record if that is more. [-]"""
 FEWEST_SAMPLES = 8
 """A channel with fewer readings in all records is not used."""
 SPIKE = 5.0
@@ -244,6 +246,12 @@ class Problem:
         return {**own, CLOCK: float(np.median(np.diff(self.records[0].time)))}
 
     @cached_property
+    def delays(self) -> dict[str, float]:
+        """Channel → usual size of a delay: some sampling intervals, or some per cent of the longest record. [s]"""
+        share = DELAY_SHARE * self._longest
+        return {name: max(DELAY_INTERVALS * interval, share) for name, interval in self.intervals.items()}
+
+    @cached_property
     def moving_inputs(self) -> set[str]:
         """Inputs that change within a record."""
         return {name for each in self.inputs for name, values in each.items() if np.ptp(values) > 0.0}
@@ -268,7 +276,7 @@ class Problem:
 
     def entries(self, terms: Terms) -> list[Entry]:
         """Return all free numbers of an explanation: of the model, its terms, starts and unknown inputs."""
-        own = entries_of(terms, self.model, self.levels(terms), self.intervals)
+        own = entries_of(terms, self.model, self.levels(terms), self.delays)
         starts = [
             Entry("start", number.name, number.nominal, number.tolerance, k, number.low, number.high)
             for k in range(len(self.records))

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from subzero.identification.candidates import declared, suggested
-from subzero.identification.explanation import Entry, Term, Terms, log_prior, with_term, without
+from subzero.identification.explanation import CLOCK, Entry, Term, Terms, log_prior, with_term, without
 from subzero.identification.fit import (
     Fit,
     Linear,
@@ -39,7 +39,7 @@ WITHIN = 5.0
 WORTH, GROSS = 3.0, 100.0
 """A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one. [nats]"""
 GROSS_KINDS = ("unit", "affine", "swapped", "input", "exchanged")
-"""Errors in the data that may be gross, as those that begin in mid-record may."""
+"""Errors in the data that may be gross, as those of all channels' clock and those that begin in mid-record may."""
 OF_MODEL = ("number", "start", "unknown")
 """Kinds of entries that every explanation has."""
 TWINS = ("offset", "scale", "affine", "delay")
@@ -67,7 +67,8 @@ def ids(terms: Terms) -> tuple[str, ...]:
 
 def _is_gross_kind(term: Term) -> bool:
     """Return whether an error in the data may be a gross one: no cause does what it does."""
-    return term.kind in GROSS_KINDS or (term.is_data_error and math.isfinite(term.begins))
+    begins = term.is_data_error and math.isfinite(term.begins)
+    return term.kind in GROSS_KINDS or term.target == CLOCK or begins
 
 
 def _new(base: Linear, linear: Linear) -> Term:
@@ -229,7 +230,9 @@ class Search:
         bare = self.there(base.linear, without(base.terms, term))
         if bare is None:
             return []
-        errors = [each for each in self._terms if each.kind in (*GROSS_KINDS, "offset")]
+        errors = [
+            each for each in self._terms if each.kind in (*GROSS_KINDS, "offset") or each.target == CLOCK
+        ]
         units = [each for each in errors if each.kind == "unit" and each.target == term.target]
         other = [each for each in suggested(self.problem, bare, errors) if _is_gross_kind(each)]
         made = [self.there(bare, with_term(bare.terms, each)) for each in (*units, *other)]
@@ -292,7 +295,9 @@ class Search:
         other, as long as each is a gross error.
         """
         here, before = nominal, self._linear_score(nominal)
-        errors = [term for term in self._terms if term.kind in (*GROSS_KINDS, "offset")]
+        errors = [
+            term for term in self._terms if term.kind in (*GROSS_KINDS, "offset") or term.target == CLOCK
+        ]
         while len(here.terms) < MOST_TERMS:
             added = [each for each in self._additions(here, errors) if _is_gross_kind(_new(here, each[1]))]
             if not added or added[0][0] < before + GROSS:

@@ -132,7 +132,8 @@ class Runs:
                     f"{shown(run.numbers)}."
                 )
             own, turn = values[:, k] if batch else values, self.model.channels[name].turn
-            readings[name] = np.unwrap(own, period=turn) if turn else own.copy()  # to be interpolated
+            is_angle = turn > 0.0 and np.isfinite(own).all()
+            readings[name] = np.unwrap(own, period=turn) if is_angle else own.copy()  # to be interpolated
         return readings
 
     def check(self, run: Asked) -> None:
