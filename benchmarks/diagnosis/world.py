@@ -33,6 +33,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import Noise, Problem, pose
 from subzero.diagnosis.vehicle_model import vehicle_model
+from subzero.identification.api import UNSEEN
 from subzero.model import Model
 from subzero.records.record import Record
 
@@ -315,7 +316,7 @@ def _by_any_model(logged: Logged, seed: int) -> dict[str, Any]:
     verdict = identification.diagnose(records, model)
     listed: dict[str, float] = {}
     for name, p in verdict.explanations.items():
-        if name == identification.UNSEEN:
+        if name == UNSEEN:
             continue
         known = " + ".join(map(_as_in_catalogue, name.split(" + ")))
         listed[known] = listed.get(known, 0.0) + p

@@ -20,13 +20,12 @@ R         residual of the best explanation over the sensor's level  1           
 Reading order: `model`, `record`, `explanation`, `problem`, `fit`, `search`, `nearness`, `locks`, `verdict`.
 """
 
-from subzero.identification.api import UNSEEN, diagnose
+from subzero.identification.api import diagnose
 from subzero.identification.model import Cause, Model, ModelError, Number, Sensor, Start, Unknown
 from subzero.identification.record import Record, read
 from subzero.identification.verdict import Verdict
 
 __all__ = [
-    "UNSEEN",
     "Cause",
     "Model",
     "ModelError",

@@ -144,13 +144,13 @@ def _concluded(search: Search, held_out: Sequence[Record], outliers: Mapping[str
 
 
 def _probabilities(search: Search, ranked: Sequence[Fit]) -> np.ndarray:
-    """Return the probability of every explanation; what is left to 1 is that of one term more which is not seen."""
+    """Return the probability of every explanation; the rest to 1 is that of one term more, unseen."""
     log = np.array([search.score(each) for each in ranked])
     return np.exp(log - logsumexp([*log, search.log_unseen()]))
 
 
 def _marginal(ranked: Sequence[Fit], probabilities: np.ndarray) -> dict[str, float]:
-    """Return the probability of every term, over all explanations; what is not seen may be added to the best one."""
+    """Return the probability of every term, over all explanations; an unseen term may be added to the best one."""
     unseen = 1.0 - float(probabilities.sum())
     found: dict[str, float] = {}
     for each, p in zip((ranked[0], *ranked), (unseen, *probabilities.tolist()), strict=True):

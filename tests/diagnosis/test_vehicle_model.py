@@ -36,7 +36,8 @@ def readings(model, record, since=None, push=None, **numbers):
     p = {name: value for name, value in model.nominal().items() if not isinstance(value, dict)} | numbers
     if since is not None:
         p["hull_drag.since"], p["hull_drag.hull_drag:share"] = since
-    u = {"trial": record.columns["trial"], "X": np.zeros(record.time.size) if push is None else push}
+    u = {name: record.columns[name] for name in model.inputs}
+    u["X"] = np.zeros(record.time.size) if push is None else push
     return model.simulate(nested(p), u, record.time)
 
 

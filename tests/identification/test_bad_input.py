@@ -39,7 +39,7 @@ def test_a_function_that_fails_within_the_tolerances_is_refused_with_the_set_tha
         CHANNELS,
         parameters=[sd.Number("a", 1.0, tolerance=0.1)],
     )
-    with pytest.raises(sd.ModelError, match=r"nan for y at 0 s, with a = 1\.01"):
+    with pytest.raises(sd.ModelError, match=r"nan for y at 0 s, with a = 1\.001"):
         sd.diagnose(RECORD, wrong)
 
 
