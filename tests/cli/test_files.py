@@ -21,7 +21,7 @@ PICTURES = {"fig6.png", "attitude.png", "cable.png", "tension.png", "forces.png"
 RUN_KEYS = """outcome outcome_message time_at_end_s peak_speed_m_s time_of_peak_speed_s speed_at_end_m_s
     heading_at_end_deg depth_at_end_m path_length_m cable_length_at_end_m largest_cable_force_N
     time_of_largest_cable_force_s largest_cable_moment_N_m time_of_largest_cable_moment_s energy diagnostics
-    warnings thinned refinement"""
+    warnings notes thinned refinement"""
 BOTH = {"tethered.nc", "tethered.csv", "untethered.nc", "untethered.csv", "summary.json", "report.html"}
 
 
