@@ -5,7 +5,7 @@ Errors in the data are open: besides known factors and offsets, the regression o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -128,28 +128,23 @@ def _of_inputs(problem: Problem, linear: Linear, terms: list[Term]) -> Iterator[
 
 
 def _log_left(problem: Problem, name: str, terms: Terms, e: np.ndarray) -> float:
-    """Return the log of the mean square of residuals of a channel (m,)."""
-    return float(np.log(np.mean(e[problem.used(name, terms)] ** 2)))
+    """Return the log of the mean square of residuals of a channel (m,), those in gaps left out."""
+    return float(np.log(np.nanmean(e[problem.used(name, terms)] ** 2)))
 
 
 def _swapped(problem: Problem, linear: Linear, terms: list[Term]) -> Iterator[Term]:
     """Yield pairs of channels that are closer to the simulation of each other than to their own."""
     for term in (term for term in terms if term.kind == "swapped"):
-        pair = (term.target, term.partner)
-        if _left(problem, linear, pair, with_term(linear.terms, term)) < _left(
-            problem, linear, pair, linear.terms
-        ):
+        there, left = with_term(linear.terms, term), 0.0
+        for name in (term.target, term.partner):
+            own = problem.recorded(name, linear.terms)
+            e = linear.e[name] + problem.recorded(name, there) - own
+            e = _wrapped(e, problem.model.channels[name].turn)
+            left += _log_left(problem, name, there, e) - _log_left(
+                problem, name, linear.terms, linear.e[name]
+            )
+        if left < 0.0:
             yield term
-
-
-def _left(problem: Problem, linear: Linear, names: Sequence[str], terms: Terms) -> float:
-    """Return the sum of log mean squares of what a point leaves of channels with the errors of some terms undone."""
-    total = 0.0
-    for name in names:
-        simulated = problem.recorded(name, linear.terms) - linear.e[name]
-        e = _wrapped(problem.recorded(name, terms) - simulated, problem.model.channels[name].turn)
-        total += np.log(np.mean(e[problem.used(name, terms) & np.isfinite(simulated)] ** 2))
-    return float(total)
 
 
 def _from_best_size(problem: Problem, linear: Linear, term: Term) -> Term:

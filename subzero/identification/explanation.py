@@ -40,8 +40,6 @@ BEYOND, OFFSET_LEVELS, RATE_SCALE = 10.0, 30.0, 0.03
 """Usual error of an offset or a drift, in tolerances of the sensor's zero, or in its levels where none is declared; of
 the rate of a clock. [-]"""
 
-SAME_LOGGER = 0.1
-"""Odds of a delay of one channel of a logger, over those of a channel of its own. [-]"""
 PRIOR_CAUSE, MOST_LIKELY, PRIOR_TOLERANCES, PRIOR_DATA, PRIOR_NEXT_DATA = 0.5, 0.05, 0.1, 0.1, 0.3
 """Prior odds that any one cause acts, and most of a single one; that tolerances are too narrow; that the readings of a
 channel have any one error; and of such an error in a logger that has one already. [-]"""
@@ -74,7 +72,7 @@ KNOWN: tuple[tuple[float, float, str], ...] = (
 )
 """Errors of a logger that people make: factor, offset in turns, words. Each is a peak of the prior."""
 OF_ACTUATORS = 5.0
-"""A smaller factor between an input and what it does may be the actuator's. [-]"""
+"""A smaller factor of an input may be the gain of its actuator. [-]"""
 KNOWN_ANGLES: tuple[tuple[float, float, str], ...] = (
     (1.0, 0.25, "a quarter of a turn too large"),
     (1.0, -0.25, "a quarter of a turn too small"),
@@ -242,18 +240,15 @@ def data_terms(model: Model) -> list[Term]:
             (f, sensor.turn * turns, words)
             for f, turns, words in (*KNOWN, *(KNOWN_ANGLES if sensor.angle else ()))
         ]
-        soft = [("offset", "has an offset"), ("scale", "has an error of scale"), ("drift", "drifts")]
-        sharing = [
-            other for other in model.channels.values() if sensor.logger and other.logger == sensor.logger
+        soft = [
+            ("offset", "has an offset"),
+            ("scale", "has an error of scale"),
+            ("drift", "drifts"),
+            ("delay", "is late or early against the inputs"),
         ]
         found += [
             Term(f"{kind}:{name}", f"{name} {words}", kind, name, odds / len(soft)) for kind, words in soft
         ]
-        # Channels of one logger have one clock, but one of them may have been kept back.
-        late = odds / (len(soft) + 1) * (SAME_LOGGER if len(sharing) > 1 else 1.0)
-        found.append(
-            Term(f"delay:{name}", f"{name} is late or early against the inputs", "delay", name, late)
-        )
         both = odds / len(soft) * PRIOR_NEXT_DATA / len(soft)  # an offset, and then an error of scale
         found.append(Term(f"affine:{name}", f"{name} has another scale and zero", "affine", name, both))
         found += [

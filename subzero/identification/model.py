@@ -114,7 +114,7 @@ class Sensor:
         zero, scale, late: standard deviations of the usual error of its zero [unit], its scale [-] and its clock [s],
             which is part of every explanation.
         trusted: no error in its data is considered.
-        logger: channels of one logger share their errors of units, and have one clock.
+        logger: channels of one logger share their errors: a second one is more likely than the first.
     """
 
     noise: float | None = None

@@ -66,7 +66,7 @@ def ids(terms: Terms) -> tuple[str, ...]:
 
 
 def _is_gross_kind(term: Term) -> bool:
-    """Return whether an error in the data may be a gross one: no cause does what it does."""
+    """Return whether an error in the data may be a gross one, which no cause can imitate."""
     begins = term.is_data_error and math.isfinite(term.begins)
     return term.kind in GROSS_KINDS or term.target == CLOCK or begins
 
@@ -115,6 +115,8 @@ class Search:
         self._tried: set[Key] = set()
         self._added: dict[int, tuple[Linear, list[tuple[float, Linear]]]] = {}
         self._terms = declared(self.problem)
+        # Offsets are among them for those that begin in mid-record.
+        self._gross = [term for term in self._terms if term.kind == "offset" or _is_gross_kind(term)]
         self._loggers = {name: sensor.logger for name, sensor in self.problem.model.channels.items()}
 
     def score(self, fitted: Fit) -> float:
@@ -215,8 +217,8 @@ class Search:
                     self._fit(linear)
 
     def _is_gross(self, base: Fit, term: Term) -> bool:
-        """Return whether a term is a unit or a regression without which the linear problem is far less probable: no
-        cause does what it does, but a cause may do what an offset, a scale, a drift or a delay does.
+        """Return whether a term is an error that no cause can imitate (as one may an offset, a scale, a drift or a
+        delay), and without which the linear problem is far less probable.
         """
         if not _is_gross_kind(term):
             return False
@@ -230,11 +232,8 @@ class Search:
         bare = self.there(base.linear, without(base.terms, term))
         if bare is None:
             return []
-        errors = [
-            each for each in self._terms if each.kind in (*GROSS_KINDS, "offset") or each.target == CLOCK
-        ]
-        units = [each for each in errors if each.kind == "unit" and each.target == term.target]
-        other = [each for each in suggested(self.problem, bare, errors) if _is_gross_kind(each)]
+        units = [each for each in self._gross if each.kind == "unit" and each.target == term.target]
+        other = [each for each in suggested(self.problem, bare, self._gross) if _is_gross_kind(each)]
         made = [self.there(bare, with_term(bare.terms, each)) for each in (*units, *other)]
         found = [self._with_own_noise(linear) for linear in made if linear]
         ranked = self._distinct(sorted(found, key=lambda pair: -pair[0]))[:FITTED]
@@ -295,11 +294,10 @@ class Search:
         other, as long as each is a gross error.
         """
         here, before = nominal, self._linear_score(nominal)
-        errors = [
-            term for term in self._terms if term.kind in (*GROSS_KINDS, "offset") or term.target == CLOCK
-        ]
         while len(here.terms) < MOST_TERMS:
-            added = [each for each in self._additions(here, errors) if _is_gross_kind(_new(here, each[1]))]
+            added = [
+                each for each in self._additions(here, self._gross) if _is_gross_kind(_new(here, each[1]))
+            ]
             if not added or added[0][0] < before + GROSS:
                 break
             before, here = added[0]
