@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 
 import subzero.diagnosis as sd
 from subzero.identification.explanation import data_terms
-from subzero.identification.fit import Levels, Products, fit, given_others, linearised, solve
+from subzero.identification.fit import Levels, Products, fit, given_others, linearised, solve, usual_levels
 from subzero.identification.noise import (
     Filter,
     Noise,
@@ -299,3 +299,23 @@ def test_errors_of_every_sensor_are_an_error_of_the_model(third):
     verdict = sd.diagnose(sd.Record(time, columns), made)
     assert verdict.verdict == ("data_error" if third else "nothing_near")
     assert {each.id.partition(":")[2] for each in verdict.named} == ({"left", "right"} if third else set())
+
+
+def test_numbers_that_trade_off_exactly_keep_their_prior_along_the_ridge():
+    """Y = (a²/b)ᵗ says a²/b, and of a and b nothing else: sd(a) = τ √(1 − 4/5), that of θ ~ N(1, τ²) with 2a − b given.
+
+    A sensitivity by a long step is off by half of it, which looks like information along the ridge. Tolerance: 20 %,
+    for a step of a hundredth of τ.
+    """
+    tau, noise, time = 0.1, 1e-3, np.linspace(0.0, 2.0, 200)
+    model = sd.Model(
+        lambda p, u, t: {"y": (p["a"] ** 2 / p["b"]) ** t},
+        {"y": sd.Sensor(noise=noise, resolution=0.0, spread=1e-3)},
+        parameters=[sd.Number("a", 1.0, tolerance=tau), sd.Number("b", 1.0, tolerance=tau)],
+    )
+    y = 1.0 + noise * np.random.default_rng(0).standard_normal(time.size)
+    problem = Problem(model, [sd.Record(time, {"y": y})])
+    entries, levels = problem.entries(()), usual_levels(problem, ())
+    found = fit(problem, linearised(problem, (), entries, np.ones(2), levels))
+    (place,) = [i for i, entry in enumerate(entries) if entry.name == "a"]
+    assert np.sqrt(found.variance[place]) == pytest.approx(tau * np.sqrt(1.0 - 4.0 / 5.0), rel=0.2)
