@@ -25,11 +25,8 @@ from subzero.identification.explanation import (
 )
 from subzero.identification.fit import Linear
 from subzero.identification.problem import Problem, Readings
+from subzero.identification.repeats import repeats
 
-FEWEST_STUCK = 10
-"""So many equal readings are looked at as a run."""
-STUCK_LEVELS = 5.0
-"""... while the simulation changes by so many levels of the sensor."""
 SAME_CLOCK = 0.1
 """Odds of a delay of a channel that has the times of the inputs, over those of one with a clock of its own. [-]"""
 CLOCK_KINDS = ("delay", "rate")
@@ -92,7 +89,7 @@ def _of_channel(problem: Problem, linear: Linear, name: str, own: list[Term]) ->
     each, used = problem.readings_of(name, linear.terms), problem.used(name, linear.terms)
     e, level, turn = linear.e[name], problem.levels(linear.terms)[name], problem.model.channels[name].turn
     simulated = problem.recorded(name, linear.terms) - e
-    yield from _stuck(problem, name, each, simulated)
+    yield from repeats(problem, name, linear.terms, simulated, data_odds(problem))
     before = float(np.mean(e[used] ** 2))
     if before < (OFF_LEVELS * level) ** 2:
         return
@@ -220,25 +217,3 @@ def _from_some_time(
 def _median_at_end(e: np.ndarray) -> float:
     """Return the median of the last quarter of residuals."""
     return float(np.median(e[-max(e.size // 4, 1) :]))
-
-
-def _stuck(problem: Problem, name: str, each: Readings, simulated: np.ndarray) -> Iterator[Term]:
-    """Yield the longest run of equal readings in each record, while the simulation moves."""
-    sensor = problem.model.channels[name]
-    for record in np.unique(each.record).tolist():
-        at = np.flatnonzero(np.isfinite(each.values) & ~each.spikes & (each.record == record))
-        values = each.values[at]
-        ends = np.flatnonzero(np.diff(values, append=np.nan) != 0.0)
-        starts = np.concatenate([[0], ends[:-1] + 1])
-        k = int(np.argmax(ends - starts))
-        first, last = int(starts[k]), int(ends[k])
-        saturated = values[first] <= sensor.low or values[first] >= sensor.high
-        moved = np.ptp(simulated[at[first : last + 1]]) if last > first else 0.0
-        if last - first < FEWEST_STUCK or saturated or moved < STUCK_LEVELS * problem.levels()[name]:
-            continue
-        start, end = float(each.time[at[first]]), float(each.time[at[last]])
-        sentence = f"{name} is stuck from {start:.4g} to {end:.4g} s"
-        odds = data_odds(problem) / at.size
-        yield Term(
-            f"stuck:{name}@{record}", sentence, "stuck", name, odds, begins=start, ends=end, record=record
-        )

@@ -11,7 +11,7 @@ sentence.
                          looks the same, and would be named
     swapped              two channels have each other's readings
     input, exchanged     an input is recorded with the other sign or in another unit; two have each other's columns
-    stuck                a run of equal readings says nothing
+    stuck                runs of equal readings say nothing
 """
 
 from __future__ import annotations
@@ -78,6 +78,8 @@ KNOWN_ANGLES: tuple[tuple[float, float, str], ...] = (
     (1.0, -0.25, "a quarter of a turn too small"),
     (1.0, 0.5, "half a turn off"),
     (-1.0, 0.25, "counted from east, against the clock"),
+    (-1.0, 0.5, "counted from south, against the clock"),
+    (-1.0, -0.25, "counted from west, against the clock"),
 )
 """The same for angles."""
 
@@ -123,6 +125,7 @@ class Term:
         odds: prior odds that it holds.
         begins: time from which it holds; −∞ throughout. [s]
         ends: time until which it holds. [s]
+        spans: first and last times of the readings that are stuck. [s]
         record: in which it holds; −1 in all.
         factor, offset: known values of y = offset + factor x. [-], [unit of the channel]
         size: where a search begins, in standard deviations of its numbers.
@@ -140,6 +143,7 @@ class Term:
     factor: float = 1.0
     offset: float = 0.0
     size: float = 0.0
+    spans: tuple[tuple[float, float], ...] = ()
 
     @property
     def is_data_error(self) -> bool:

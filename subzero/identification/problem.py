@@ -516,7 +516,8 @@ class Problem:
 
     def _where(self, each: Readings, term: Term) -> np.ndarray:
         of = np.ones(each.time.size, dtype=bool) if term.record < 0 else each.record == term.record
-        return of & (each.time >= term.begins) & (each.time <= term.ends)
+        spans = term.spans or ((term.begins, term.ends),)
+        return of & np.any([(each.time >= first) & (each.time <= last) for first, last in spans], axis=0)
 
     def _ramp(self, each: Readings) -> np.ndarray:
         """Return time as −½ at the beginning of each record and ½ at its end (m,)."""

@@ -38,7 +38,7 @@ WITHIN = 5.0
 """Explanations within this of the best are expanded, too. [nats]"""
 WORTH, GROSS = 3.0, 100.0
 """A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one. [nats]"""
-GROSS_KINDS = ("unit", "affine", "swapped", "input", "exchanged")
+GROSS_KINDS = ("unit", "affine", "swapped", "input", "exchanged", "stuck")
 """Errors in the data that may be gross, as those of all channels' clock and those that begin in mid-record may."""
 OF_MODEL = ("number", "start", "unknown")
 """Kinds of entries that every explanation has."""
