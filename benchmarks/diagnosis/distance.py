@@ -16,13 +16,12 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import columns_of, nameable, variances
 from subzero.diagnosis.inference import (
-    BaseRun,
     ForceInformation,
     Problem,
     Quadratic,
-    change_point_columns,
     posterior,
     seen,
+    with_change_point,
 )
 
 ABOUT = (-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0)
@@ -102,11 +101,19 @@ def sudden_distance(
     base, found = posterior(q, D), dict([strangeness(problem, J, change)[::-1]])
     others = [without_common(effect, one) for effect in effects.values() if effect.id != one]
     pairs = [(effect, time + later) for effect in others for later in ABOUT]
-    for (effect, when), C in zip(pairs, change_point_columns(BaseRun(problem, zero), pairs), strict=True):
+    for effect, when in pairs:
+        C = onset_columns(problem, effect, when)
         explained = _explained(seen(q.A, q.b, D, J, C, change), effect)
         found[f"{effect.id}@{when:.3g}"] = max(-2.0 * base.log_evidence - base.log_det - explained, 0.0)
     rival = min(found, key=lambda name: found[name])
     return found[rival], rival
+
+
+def onset_columns(problem: Problem, effect: Effect, time: float) -> np.ndarray:
+    """Return whitened sensitivities (m, parameters) of the nominal model to an effect from a time on. [s]"""
+    more, n = with_change_point(problem, effect, time, 0), len(problem.entries)
+    at = range(n, n + len(effect.parameters))
+    return more.jacobian(np.zeros(len(more.entries)), at)[:, at]
 
 
 def without_common(effect: Effect, one: str) -> Effect:

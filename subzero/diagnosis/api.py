@@ -1,21 +1,12 @@
-"""`subzero.diagnose`: from files or records to a verdict, and the order in which the engine runs its parts.
+"""`subzero.diagnose`: from files or records to a verdict.
 
-    problem → detectability → residuals → model search → out of catalogue → verdict → extended model, gain, next trial
-
-If even the fit with wide priors (κ = 4) is not close to the records, or the first fits are all poor, explanations
-that are not in the catalogue are tried first: with an estimated input force the simulation follows the records, where
-linearisation is accurate, and a change point that explains them ends the search.
-
-For records that may have errors in their data there are several findings, one for each set of errors that was tried;
-the sets are nested. The verdict reports the largest set for which the probability of it, or of a larger one, is high
-enough to be named; the next larger set is reported with the diagnosis as possible, if it is not improbable.
+records, trials → detectability → model → search (`subzero.identification`) → verdict, extended model, next trial
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -27,49 +18,19 @@ from threadpoolctl import threadpool_limits
 from subzero import identification
 from subzero.arguments import checked_arguments
 from subzero.channels import BY_NAME
-from subzero.diagnosis.assessment.goodness_of_fit import curves, misfits
-from subzero.diagnosis.assessment.identifiability import detectability, with_whole_effects
-from subzero.diagnosis.hypothesis.catalogue import load, with_own
-from subzero.diagnosis.hypothesis.data_error import DataError
+from subzero.diagnosis.assessment import detectability, with_whole_effects
+from subzero.diagnosis.hypothesis.catalogue import SPECS, load, with_own
 from subzero.diagnosis.hypothesis.effect import Effect
 from subzero.diagnosis.hypothesis.logged import NO_RECORD, Logged
 from subzero.diagnosis.hypothesis.noise import level_of
-from subzero.diagnosis.inference.data_error_choice import compared
-from subzero.diagnosis.inference.data_error_evidence import Explained, leaves_only_noise
-from subzero.diagnosis.inference.data_error_search import SuspectedError, mimicked_by_physics, suspected
-from subzero.diagnosis.inference.linear_gaussian import log_sum
-from subzero.diagnosis.inference.model_average import NAMED_PROBABILITY
-from subzero.diagnosis.inference.model_search import Search
-from subzero.diagnosis.inference.out_of_catalogue import (
-    Findings,
-    each_with_refitted_noise,
-    explanations_outside,
-    is_explained,
-)
-from subzero.diagnosis.inference.posing import pose, posed_again, sensitive_runs
-from subzero.diagnosis.inference.problem import Problem, Progress
-from subzero.diagnosis.inference.simulator import respond
+from subzero.diagnosis.inference import Progress, pose, respond
 from subzero.diagnosis.read_trials import read_trials
-from subzero.diagnosis.results import (
-    DATA_ERROR,
-    NOTHING_NEAR,
-    UNDECIDED,
-    Curves,
-    Detectability,
-    FoundError,
-    Rival,
-    Verdict,
-)
-from subzero.diagnosis.verdict.conclude import conclude, decided
-from subzero.diagnosis.verdict.follow_up import follow_up, ranked, refuted_rivals
+from subzero.diagnosis.results import Detectability, Verdict
+from subzero.diagnosis.vehicle_model import Effects, vehicle_model
+from subzero.diagnosis.verdict.conclude import Asked, concluded
 from subzero.errors import UserError, chosen, whole
 from subzero.model import Model
 from subzero.records.record import Record
-
-WORTH_TELLING = 0.05
-"""Errors that are less probable are not reported with a diagnosis of the records that leaves them uncorrected."""
-MOST, EVEN = 1.0 - 1e-9, 0.5
-"""Largest probability of an error; and of one that may not be named."""
 
 BUDGETS = ("screen", "verdict", "full")
 """Linear evidence only; up to the verdict and the extended model; with gain and next trial."""
@@ -208,26 +169,56 @@ def _diagnosed(
     budget: str,
 ) -> Verdict:
     """Diagnose records, all of whose channels can be used."""
-    started = perf_counter()
-    problem = pose(records, effects)
+    began, report = perf_counter(), Steady(progress or (lambda share, words: None))
+    known = Effects.of([each.setting for each in records], _channels(records), effects)
+    asked = Asked(
+        records=records,
+        effects=effects,
+        onsets={**known.onsets, **{id: effect for id, effect in known.throughout.items() if effect.sudden}},
+        budget=budget,
+        seed=seed,
+        progress=report,
+    )
     with threadpool_limits(limits=1, user_api="blas"):  # simulations use the cores; matrices are small
-        suspicion = suspected(problem, records)
-        looking = _Looking(
-            problem=problem,
-            effects=effects,
-            progress=progress or (lambda share, words: None),
-            seen=seen or (lambda table: None),
-            seed=seed,
-            budget=budget,
-            scanned=perf_counter() - started,
-            most=len(suspicion.errors) + 1,
-        )
-        if not suspicion.errors:
-            work = looking.start(records)
-            looking.begin(work)
-            looking.finish(work)
-            return _concluded(work)
-        return _on_records(records, compared(suspicion, records, looking), _concluded)
+        detectable = _detectable(records, effects)
+        if seen:
+            seen(detectable)
+        model, own = vehicle_model(records, effects=effects)
+        searched = perf_counter()
+        outcome = identification.api.outcome(own, model, progress=report, screen=budget == "screen")
+        concluding = perf_counter()
+        verdict = concluded(asked, outcome, detectable)
+    parts = {
+        "detectability": searched - began,
+        "search": concluding - searched,
+        "conclusion": perf_counter() - concluding,
+    }
+    return replace(verdict, seconds=parts)
+
+
+@dataclass
+class Steady:
+    """A progress that never decreases."""
+
+    progress: Progress
+    most: float = 0.0
+
+    def __call__(self, share: float, words: str) -> None:
+        """Report a share that is done, and the present step."""
+        self.most = max(self.most, share)
+        self.progress(self.most, words)
+
+
+def _channels(records: Sequence[Logged]) -> list[str]:
+    """Return the channels of some records that can be diagnosed."""
+    return list(dict.fromkeys(name for each in records for name in each.record.values if name in SPECS))
+
+
+def _detectable(records: Sequence[Logged], effects: tuple[Effect, ...]) -> tuple[Detectability, ...]:
+    """Return the detectability of causes in records, with usual noise, around the nominal model."""
+    problem = pose(records, effects)
+    J = problem.jacobian(np.zeros(len(problem.entries)))
+    return detectability(problem, with_whole_effects(problem, J))
 
 
 def _without_worst_channel(records: Sequence[Logged]) -> tuple[list[Logged], str]:
@@ -256,342 +247,3 @@ def _without_worst_channel(records: Sequence[Logged]) -> tuple[list[Logged], str
         kept,
         f"{record.source}: {column} is set aside: no diagnosis can be computed with it. Check its values.",
     )
-
-
-@dataclass(kw_only=True, eq=False)
-class _Looking:
-    """The search of records, as they are or with errors in their data corrected: a `DiagnosisSteps`.
-
-    Attributes:
-        problem: of the records as they are.
-        effects: causes besides the catalogue.
-        scanned: duration of the scan for errors in the data. [s]
-        most: largest number of searches.
-        done: number of searches so far.
-        shown: the largest share of the work that was reported.
-    """
-
-    problem: Problem
-    effects: tuple[Effect, ...]
-    progress: Progress
-    seen: Seen
-    seed: int
-    budget: str
-    scanned: float
-    most: int
-    done: int = 0
-    shown: float = 0.0
-
-    def _report_progress(self, share: float, words: str) -> None:
-        """Report the progress, which never decreases."""
-        self.shown = max(self.shown, share)
-        self.progress(self.shown, words)
-
-    def start(self, records: Sequence[Logged]) -> Findings:
-        """Return findings with the fit of records within wide tolerances."""
-        low, self.done = self.done / self.most, self.done + 1
-        search = Search(
-            problem=posed_again(self.problem, records, self.effects),
-            progress=lambda share, words: self._report_progress(low + share / self.most, words),
-        )
-        work = Findings(search=search, seed=self.seed, budget=self.budget)
-        work.seconds["errors in the data"] = self.scanned
-        seen = self.seen if self.done == 1 else lambda table: None
-        _keeping_what_there_is(work, lambda: _fit_wide(work, seen))
-        return work
-
-    def begin(self, work: Findings, is_hopeless: Callable[[], bool] = lambda: False) -> None:
-        """Do the first part, the screening; if it is hopeless, stop after explanations that are not in the catalogue,
-        as one of them may still explain the records.
-        """
-        _keeping_what_there_is(work, lambda: _first_step(work, is_hopeless))
-
-    def finish(self, work: Findings) -> None:
-        """Do the remaining part."""
-        if work.complete and self.budget != "screen":
-            _keeping_what_there_is(work, lambda: _refine(work))
-
-
-def _keeping_what_there_is(findings: Findings, part: Callable[[], None]) -> None:
-    """Do a part; if it is interrupted, keep the results so far."""
-    try:
-        part()
-    except KeyboardInterrupt:
-        findings.complete = False
-        if () not in findings.search.candidates:
-            raise
-
-
-@contextmanager
-def _timed(findings: Findings, part: str) -> Iterator[None]:
-    """Record the duration of a part."""
-    started = perf_counter()
-    yield
-    findings.seconds[part] = findings.seconds.get(part, 0.0) + perf_counter() - started
-
-
-def _concluded(findings: Findings) -> Verdict:
-    known = ranked(findings)
-    return conclude(findings, known, follow_up(findings, known))
-
-
-def _fit_wide(findings: Findings, seen: Seen) -> None:
-    """Fit within wide tolerances, measure the misfit, and report the detectability of causes."""
-    search = findings.search
-    with _timed(findings, "screen"):
-        search.begin()
-        _measure_misfit(findings)
-        findings.detectable = detectability(
-            findings.problem, with_whole_effects(findings.problem, search.nominal[1])
-        )
-        seen(findings.detectable)
-
-
-def _first_step(findings: Findings, is_hopeless: Callable[[], bool]) -> None:
-    """Screen all hypotheses, fit the best, and try explanations that are not in the catalogue where none of them
-    explains the records.
-    """
-    search, explained = findings.search, False
-    with _timed(findings, "screen"):
-        if search.is_far and findings.budget != "screen":
-            explained = _one_explains(findings)
-            if not explained:
-                _from_afar(findings)
-                findings.given_up = is_hopeless()
-            if findings.given_up:
-                return
-        if not search.is_far or not search.screen.far:
-            search.screen_causes()
-    if findings.budget == "screen":
-        search.fit(())
-        return
-    with _timed(findings, "fits"):
-        search.first_fits()
-        findings.given_up = not explained and is_hopeless() and bool(findings.out_of_catalogue)
-        if not findings.given_up:
-            search.fit_from_nominal()
-        if search.is_poor() and not findings.given_up:
-            search.refine_first()
-    if search.is_poor() and not findings.out_of_catalogue:
-        _search_out_of_catalogue(findings, 0.6, "forces, and causes that begin in mid-trial")
-
-
-def _refine(findings: Findings) -> None:
-    """Fit until no fit improves, and try explanations that are not in the catalogue again."""
-    search = findings.search
-    if not is_explained(search, findings.out_of_catalogue):
-        with _timed(findings, "fits"):
-            search.refine_first()
-            search.grow()
-            search.settle()
-        _search_out_of_catalogue(findings, 0.8, "forces that no cause explains")
-    with _timed(findings, "outside"):
-        findings.refuted = refuted_rivals(search)
-        findings.sensitive = sensitive_runs(search.problem, search.best().fit.z)
-        findings.out_of_catalogue = each_with_refitted_noise(search, findings.out_of_catalogue)
-        _measure_misfit(findings)
-
-
-def _search_out_of_catalogue(findings: Findings, share: float, words: str) -> None:
-    findings.search.progress(share, words)
-    with _timed(findings, "outside"):
-        findings.out_of_catalogue = explanations_outside(findings.search)
-
-
-def _measure_misfit(findings: Findings) -> None:
-    """Compare the nominal simulation with the records, with the noise as it is estimated so far."""
-    for record in findings.records:
-        findings.misfit[record.name] = misfits(record, respond(record.setting, record.time, record.noise))
-
-
-def _one_explains(findings: Findings) -> bool:
-    """Fit single causes that are best in simulations of some sizes, and say whether one of them explains the records,
-    within declared tolerances: then no force or change point is needed as a linearisation point.
-    """
-    findings.search.progress(0.2, "causes of any size")
-    findings.search.only_nothing()
-    findings.search.screen_causes()
-    findings.search.fit_large_effects()
-    return leaves_only_noise(findings) and not findings.search.is_poor()
-
-
-def _from_afar(findings: Findings) -> None:
-    """Fit a force or a change point, so that the simulation follows the records, and use that fit as the
-    linearisation point.
-    """
-    search = findings.search
-    search.progress(0.25, "forces, and causes that begin in mid-trial")
-    aside = search.set_aside()
-    findings.out_of_catalogue = explanations_outside(search)
-    if findings.out_of_catalogue[0].point:
-        search.relinearise_at(findings.out_of_catalogue[0].point.fit)
-    search.take_back(aside)
-
-
-def _on_records(
-    records: Sequence[Logged],
-    tried: Sequence[tuple[Explained, float]],
-    conclude: Callable[[Findings], Verdict],
-) -> Verdict:
-    """Return the verdict on records that may have errors in their data.
-
-    Args:
-        records: as they are.
-        tried: sets of errors that they may have, each with the explanation of the corrected records and its log
-            evidence.
-        conclude: makes the verdict on records from findings.
-    """
-    sets = sorted((trial for trial, _ in tried), key=lambda trial: len(trial.errors))
-    total, logs = log_sum([log for _, log in tried]), {id(trial): log for trial, log in tried}
-    each = np.exp([logs[id(trial)] - total for trial in sets])
-    at_least = np.minimum(np.cumsum(each[::-1])[::-1], MOST)  # of a set, or of a larger one
-    reported = max((i for i, trial in enumerate(sets) if _is_named(trial, at_least[i])), default=0)
-    verdict = conclude(sets[reported].work)
-    is_complete = all(trial.work.complete for trial in sets)
-    if sets[reported].errors:
-        is_decided = is_complete or not any(map(mimicked_by_physics, sets[reported].errors))
-        verdict = _with_errors(
-            verdict, records, sets[reported], float(at_least[reported]) if is_decided else None
-        )
-    verdict = replace(verdict, complete=is_complete)
-    if reported + 1 == len(sets):
-        return verdict
-    return _with_possible(verdict, records, sets[reported], sets[reported + 1], float(at_least[reported + 1]))
-
-
-def _is_named(explanation: Explained, probability: float) -> bool:
-    """Say whether errors may be the verdict: they are probable, and the records without them are explained."""
-    if probability < NAMED_PROBABILITY or not leaves_only_noise(explanation.work):
-        return False
-    return decided(explanation.work, ranked(explanation.work)) != NOTHING_NEAR
-
-
-def _with_errors(
-    after: Verdict, records: Sequence[Logged], explanation: Explained, probability: float | None
-) -> Verdict:
-    """Return the verdict `data_error`, with the diagnosis of the records without the errors; `undecided` where they
-    could not be compared with all other explanations (None), as the diagnosis was interrupted.
-    """
-    share = EVEN if probability is None else probability
-    errors = _reported(records, explanation.errors, share)
-    curves = {
-        name: replace(own, recorded=_recorded(records, explanation.errors, name))
-        for name, own in after.curves.items()
-    }
-    listed = {
-        _name_with_errors(explanation.errors, name): share * p for name, p in after.probabilities.items()
-    }
-    words = " ".join(f"{error.record}: {error.sentence}: {error.remedy}." for error in errors)
-    return replace(
-        after,
-        verdict=UNDECIDED if probability is None else DATA_ERROR,
-        data_errors=errors,
-        then=after.verdict,
-        sentence=f"{words} After that: {after.sentence}",
-        probabilities=listed,
-        curves=curves,
-    )
-
-
-def _recorded(
-    records: Sequence[Logged], found: Sequence[SuspectedError], name: str
-) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-    """Return channel → times and values as a record has them, of channels with errors in their data."""
-    return {
-        channel: (records[suspect.record].record.time, records[suspect.record].record.values[channel])
-        for suspect in found
-        for channel in (() if suspect.error.is_of_commands else suspect.error.channels)
-        if records[suspect.record].name == name
-    }
-
-
-def _with_possible(
-    reported: Verdict, records: Sequence[Logged], less: Explained, more: Explained, probability: float
-) -> Verdict:
-    """Return a verdict with further errors in the data added as possible.
-
-    Errors that would be probable enough, but may not be named, get a probability of at most one half.
-    """
-    if probability < WORTH_TELLING:
-        return reported
-    probability = min(probability, EVEN)
-    known = {(error.record, error.error.id) for error in less.errors}
-    further = [error for error in more.errors if (error.record, error.error.id) not in known]
-    errors = _reported(records, further, probability)
-    listed = {name: (1.0 - probability) * p for name, p in reported.probabilities.items()}
-    listed[_name_with_errors(more.errors, "none")] = probability
-    words = " and ".join(error.sentence for error in errors)
-    rival = Rival(
-        ids=tuple(error.id for error in errors),
-        sentence=words,
-        probability=probability,
-        discrimination=np.nan,
-    )
-    drawn = _with_planted(
-        reported.curves, records, more, further, f"rival: {_name_with_errors(more.errors, 'none')}"
-    )
-    rivals = tuple(sorted([*reported.rivals, rival], key=lambda each: -each.probability))
-    ranked = dict(sorted(listed.items(), key=lambda pair: -pair[1]))
-    with_rival = replace(
-        reported,
-        rivals=rivals,
-        curves=drawn,
-        probabilities=ranked,
-        sentence=f"{reported.sentence} Or {words}.",
-        data_errors=reported.data_errors or errors,
-    )
-    if probability <= 1.0 - NAMED_PROBABILITY or reported.on_model == NOTHING_NEAR:
-        return with_rival
-    return replace(with_rival, then=UNDECIDED) if reported.then else replace(with_rival, verdict=UNDECIDED)
-
-
-def _with_planted(
-    shown: Mapping[str, Curves],
-    records: Sequence[Logged],
-    more: Explained,
-    further: Sequence[SuspectedError],
-    label: str,
-) -> dict[str, Curves]:
-    """Return record → curves, with the explanation of the records without further errors added, as it would be
-    recorded with these.
-    """
-    found, made = dict(shown), curves(more.work.problem, {label: more.work.search.best().fit})
-    for i, record in enumerate(records):
-        own = made[record.name]
-        logged = replace(record, record=Record(source="", time=own.time, values=own.models[label]))
-        for suspect in further:
-            logged = suspect.error.planted(logged) if suspect.record == i else logged
-        time, values = logged.record.time, logged.record.values
-        model = {name: np.interp(shown[record.name].time, time, column) for name, column in values.items()}
-        found[record.name] = replace(shown[record.name], models={**shown[record.name].models, label: model})
-    return found
-
-
-def _name_with_errors(found: Sequence[SuspectedError], name: str) -> str:
-    """Return the name of an explanation with errors in the data added to it."""
-    ids = dict.fromkeys(trial.error.id for trial in found)
-    return " + ".join([*ids, *([] if name == "none" else [name])])
-
-
-def _reported(
-    records: Sequence[Logged], found: Sequence[SuspectedError], probability: float
-) -> tuple[FoundError, ...]:
-    return tuple(
-        FoundError(
-            id=trial.error.id,
-            record=records[trial.record].name,
-            columns=trial.error.columns,
-            sentence=trial.error.sentence(),
-            remedy=trial.error.remedy(),
-            probability=probability,
-            amount=trial.error.amount,
-            amount_sd=trial.error.amount_sd,
-            since=trial.error.since,
-            alike=tuple(_words(each) for each in trial.alike),
-        )
-        for trial in found
-    )
-
-
-def _words(error: DataError) -> str:
-    return f"{error.sentence()}: {error.remedy()}"

@@ -9,8 +9,8 @@ record becomes its starts. Errors in the data are those of any model, so that ef
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,13 +19,21 @@ import scenarios
 from scenarios.steps import held
 from subzero import identification as general
 from subzero.channels import BY_NAME, HEADING
-from subzero.diagnosis.hypothesis.catalogue import SPECS, START, catalogue, with_own
-from subzero.diagnosis.hypothesis.catalogue.sensors import SCALE
+from subzero.diagnosis.hypothesis.catalogue import ONSETS, SAMPLED, SPECS, START, catalogue, with_own
+from subzero.diagnosis.hypothesis.catalogue.sensors import CLOCK, SCALE
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter, with_onset
-from subzero.diagnosis.hypothesis.hypotheses import moves_nothing, with_tolerances
+from subzero.diagnosis.hypothesis.hypotheses import is_absent, moves_nothing, with_tolerances
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.simulator import Stop, Track, economical, read, simulate_on, with_stops
+from subzero.diagnosis.inference.simulator import (
+    Stop,
+    Track,
+    economical,
+    read,
+    simulate_on,
+    with_limit,
+    with_stops,
+)
 from subzero.errors import UserError
 from subzero.external_force import AXES, MissingForce
 from subzero.records.consistency import REPORTED_COMMANDS
@@ -34,6 +42,8 @@ OF_ANY_MODEL = ("sensor_bias", "sensor_scale", "clock_offset")
 """Effects that `Sensor` and errors in the data say."""
 KNOWN_SPREAD, USUAL_SPREAD = 0.1, 0.7
 """Standard deviation of the logarithm of a sensor's level: given by the user, or that of usual sensors. [-]"""
+AFTERWARDS = ("sensors", "clock")
+"""Slots of effects that act on a finished simulation."""
 TRIAL = "trial"
 """Input by which the function knows which of several records it simulates."""
 AXIS_SIZES = {"X": 0.02, "Y": 0.02, "Z": 0.02, "K": 0.0005, "M": 0.002, "N": 0.002}
@@ -45,48 +55,57 @@ STOPS, SIMULATIONS_KEPT = 10, 8
 
 
 def vehicle_model(
-    logged: Sequence[Logged], *, axes: Sequence[str] = ()
+    logged: Sequence[Logged], *, effects: Iterable[Effect] = (), axes: Sequence[str] = ()
 ) -> tuple[general.Model, list[general.Record]]:
     """Return the model of some trials of one vehicle, and their records.
 
     Args:
         logged: records with their trials.
+        effects: causes besides the catalogue.
         axes: of the hull on which unknown forces act, such as "XN"; each costs a simulation for every 4 s.
 
     Raises:
-        UserError: an axis does not exist.
+        UserError: an axis does not exist; the nominal model cannot be run through a trial.
     """
     for axis in axes:
         if axis not in AXES:
             raise UserError(f"there is no axis {axis!r}. Allowed: {', '.join(AXES)}.")
-    settings = [economical(each.setting, float(each.record.time[-1])) for each in logged]
+    settings = [_prepared(each) for each in logged]
     channels = list(dict.fromkeys(name for each in logged for name in each.record.values if name in SPECS))
-    effects = _effects(settings[0], channels)
+    known = Effects.of(settings, channels, effects)
     commands = [_commands(setting) for setting in settings]
     inputs = list(REPORTED_COMMANDS) if all(values is not None for values in commands) else []
-    noise = {name: level for each in logged for name, level in each.noise.items()}
-    trusted = {name for each in logged for name in each.trusted}
     model = general.Model(
-        _simulate(settings, effects, channels),
-        {name: _sensor(name, noise, trusted) for name in channels},
+        _simulate(settings, known, channels),
+        {name: _sensor(name, logged) for name in channels},
         inputs=[TRIAL, *inputs],
-        parameters=[*_numbers(effects.values(), general.Number), *_numbers(START, general.Start)],
-        causes=[_cause(effect) for effect in effects.values()],
+        parameters=[
+            *_numbers(known.throughout.values(), general.Number),
+            *_numbers(known.starts, general.Start),
+        ],
+        causes=[*map(_cause, known.throughout.values()), *map(_onset, known.onsets.values())],
         unknown=[general.Unknown(axis, AXIS_SIZES[axis], AXIS_TIME_S) for axis in axes],
     )
-    records = [
-        general.Record(
-            each.record.time,
-            {
-                TRIAL: np.full(each.record.time.size, float(k)),
-                **{name: each.record.values[name] for name in channels if name in each.record.values},
-                **(dict(zip(inputs, _held(setting, each.record.time), strict=True)) if inputs else {}),
-            },
-            name=each.name,
-        )
+    return model, [
+        _record(k, each, setting, channels, inputs)
         for k, (each, setting) in enumerate(zip(logged, settings, strict=True))
     ]
-    return model, records
+
+
+def _prepared(logged: Logged) -> Setting:
+    """Return the setting of a record in economical steps, to its end and on, as its clock may be early."""
+    end = min(float(logged.record.time[-1]), logged.setting.trial.duration) - CLOCK.parameters[0].low
+    return with_limit(economical(logged.setting, end))[0]
+
+
+def _record(
+    k: int, logged: Logged, setting: Setting, channels: Sequence[str], inputs: Sequence[str]
+) -> general.Record:
+    """Return a record, the trial of number k, with its commands as inputs."""
+    time, values = logged.record.time, logged.record.values
+    columns = {name: values[name] for name in channels if name in values}
+    held = dict(zip(inputs, _held(setting, time), strict=True)) if inputs else {}
+    return general.Record(time, {TRIAL: np.full(time.size, float(k)), **columns, **held}, name=logged.name)
 
 
 def _commands(setting: Setting) -> scenarios.Commands | None:
@@ -125,18 +144,61 @@ def _with_commands(
     return replace(setting, trial=replace(setting.trial, commands=changed)), key
 
 
-def _effects(setting: Setting, channels: Sequence[str]) -> dict[str, Effect]:
-    """Return the effects that are possible in a trial and change something in it."""
-    slots = () if setting.tethered else ("cable", "drum")
-    drum = ("drum",) if setting.model.winch is not None else ()
-    own = with_own((), setting.model.vehicle)
-    return {
-        effect.id: replace(effect, parameters=tuple(p.within(setting) for p in effect.parameters))
-        for effect in (with_tolerances(each, setting) for each in catalogue(channels, own).values())
-        if effect.slot not in (*slots, *drum)
-        and effect.id.partition(":")[0] not in OF_ANY_MODEL
-        and not moves_nothing(effect, setting)
-    }
+@dataclass(frozen=True)
+class Effects:
+    """The effects that are possible in some trials and change something there.
+
+    Attributes:
+        throughout: id → effect that may hold throughout, and has a tolerance.
+        onsets: id → effect that can only begin in mid-trial.
+        starts: effects of the start of each record.
+    """
+
+    throughout: Mapping[str, Effect]
+    onsets: Mapping[str, Effect]
+    starts: Sequence[Effect]
+
+    @classmethod
+    def of(cls, settings: Sequence[Setting], channels: Sequence[str], more: Iterable[Effect]) -> Effects:
+        """Return those of the catalogue and of the vehicle's lists, and more."""
+        nominal = settings[0]
+        own = with_own(more, nominal.model.vehicle)
+        may = [effect for effect in catalogue(channels, own).values() if _is_possible(effect, settings)]
+        throughout = [with_tolerances(effect, nominal) for effect in may if effect.slot != CLOCK.slot]
+        return cls(
+            {
+                effect.id: replace(effect, parameters=tuple(p.within(nominal) for p in effect.parameters))
+                for effect in throughout
+                if effect.id.partition(":")[0] not in OF_ANY_MODEL and not moves_nothing(effect, nominal)
+            },
+            {effect.id: effect for effect in ONSETS if _is_possible(effect, settings)},
+            (*START, SAMPLED) if any(setting.intervals for setting in settings) else START,
+        )
+
+    def on(self, p: Mapping[str, Any]) -> Iterator[tuple[Effect, list[float]]]:
+        """Yield the effects that hold throughout with their deviations in parameters of the model."""
+        for effect in (*self.throughout.values(), *self.starts):
+            yield effect, [p[_name(effect, each)] for each in effect.parameters]
+
+    def late(self, p: Mapping[str, Any]) -> Iterator[tuple[Effect, float, list[float]]]:
+        """Yield the effects that begin in mid-trial, with their onset [s] and deviations."""
+        for effect in self.throughout.values():
+            if effect.sudden:
+                yield (
+                    effect,
+                    p[effect.id]["since"],
+                    [p[effect.id][_name(effect, z)] for z in effect.parameters],
+                )
+        for effect in self.onsets.values():
+            yield effect, p[effect.id]["since"], [p[effect.id][z.name] for z in effect.parameters]
+
+
+def _is_possible(effect: Effect, settings: Sequence[Setting]) -> bool:
+    """Return whether a cause is possible in some trials: without a cable or a free drum, some are not."""
+    tethered = any(setting.tethered for setting in settings)
+    winch = any(setting.model.winch is not None for setting in settings)
+    there = (effect.slot not in ("cable", "drum") or tethered) and not (effect.slot == "drum" and winch)
+    return there and not is_absent(effect, settings[0])
 
 
 def _name(effect: Effect, parameter: Parameter) -> str:
@@ -157,60 +219,75 @@ def _cause(effect: Effect) -> general.Cause:
     return general.Cause(effect.id, effect.sentence, changes=changes, onset=effect.sudden)
 
 
-def _sensor(name: str, noise: Mapping[str, float], trusted: set[str]) -> general.Sensor:
+def _onset(effect: Effect) -> general.Cause:
+    """Return a cause that can only begin in mid-trial."""
+    numbers = {
+        p.name: general.Number(0.0, scale=p.scale, low=p.low, high=p.high, unit=p.unit)
+        for p in effect.parameters
+    }
+    off = dict.fromkeys(numbers, 0.0)
+    return general.Cause(effect.id, effect.sentence, off=off, onset=True, throughout=False, **numbers)  # type: ignore[arg-type]
+
+
+def _sensor(name: str, logged: Sequence[Logged]) -> general.Sensor:
+    known = {each.noise[name] for each in logged if name in each.noise}
+    steps = [each.steps[name] for each in logged if name in each.steps]
     return general.Sensor(
-        noise=noise.get(name, SPECS[name].noise),
-        spread=KNOWN_SPREAD if name in noise else USUAL_SPREAD,
+        noise=max(known, default=SPECS[name].noise),
+        spread=KNOWN_SPREAD if known else USUAL_SPREAD,
         unit=BY_NAME[name].unit.replace("degree", "deg"),
         angle=name == HEADING,
+        resolution=steps[0] if steps else None,
         zero=SPECS[name].bias,
         scale=SCALE[0],
-        trusted=name in trusted,
+        trusted=any(name in each.trusted for each in logged),
         logger="vehicle",
     )
 
 
 def _simulate(
-    settings: Sequence[Setting], effects: Mapping[str, Effect], channels: Sequence[str]
+    settings: Sequence[Setting], effects: Effects, channels: Sequence[str]
 ) -> general.model.Simulate:
     """Return the function of the model: what the sensors of a trial would show."""
     kept, commanded = _Simulations(), all(_commands(setting) is not None for setting in settings)
 
     def simulate(p: Mapping[str, Any], u: Mapping[str, Any], t: np.ndarray) -> dict[str, np.ndarray]:
-        trial, named = int(u[TRIAL][0]), effects.values()
-        whole = {
-            effect.id: [p[_name(effect, each)] for each in effect.parameters] for effect in (*named, *START)
-        }
-        late = {
-            effect.id: (
-                p[effect.id]["since"],
-                [p[effect.id][_name(effect, each)] for each in effect.parameters],
-            )
-            for effect in named
-            if effect.sudden
-        }
-        given, key = _with_commands(settings[trial], u, t) if commanded else (settings[trial], ())
-        force = np.column_stack([u.get(axis, np.zeros(t.size)) for axis in AXES])
+        trial, force = int(u[TRIAL][0]), np.column_stack([u.get(axis, np.zeros(t.size)) for axis in AXES])
+        on = [(effect, values) for effect, values in effects.on(p) if any(values)]
+        late = [(effect, since, values) for effect, since, values in effects.late(p) if any(values)]
+        setting, key = _with_commands(settings[trial], u, t) if commanded else (settings[trial], ())
         asked = _Asked(
             trial,
-            {effect.id: tuple(whole[effect.id]) for effect in (*named, *START) if effect.slot != "sensors"}
+            {effect.id: tuple(values) for effect, values in on if effect.slot not in AFTERWARDS}
             | {"commands": key},
-            {id: (since, *values) for id, (since, values) in late.items() if any(values)},
+            {effect.id: (since, *values) for effect, since, values in late},
             t,
             force,
         )
-        setting = given
-        for effect in (*named, *START):
-            if any(whole[effect.id]):
-                setting = effect.apply(setting, *whole[effect.id])
-        for id, (since, *values) in asked.late.items():
-            setting = with_onset(effects[id], since).apply(setting, *values)
-        if force.any():
-            missing = MissingForce(time=tuple(t.tolist()), wrench=tuple(map(tuple, force.tolist())))
-            setting = setting.with_model(missing=missing + setting.model.missing)
+        setting = with_effects(setting, on, late, t, force)
         return read(setting, kept.track(asked, setting), t, channels)
 
     return simulate
+
+
+def with_effects(
+    setting: Setting,
+    on: Iterable[tuple[Effect, list[float]]],
+    late: Iterable[tuple[Effect, float, list[float]]],
+    time: np.ndarray,
+    force: np.ndarray,
+) -> Setting:
+    """Return a setting with effects: deviations of those that hold throughout; onset and deviations of the others; and
+    a force (n, 6) on the hull at times (n,).
+    """
+    for effect, values in on:
+        setting = effect.apply(setting, *values)
+    for effect, since, values in late:
+        setting = with_onset(effect, since).apply(setting, *values)
+    if not force.any():
+        return setting
+    missing = MissingForce(time=tuple(time.tolist()), wrench=tuple(map(tuple, force.tolist())))
+    return setting.with_model(missing=missing + setting.model.missing)
 
 
 class _Asked(NamedTuple):

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from time import process_time
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import logsumexp
@@ -78,6 +79,31 @@ def diagnose(
         UserError: a record cannot be used, or there is no time.
         ModelError: the model cannot be used.
     """
+    return outcome(records, model, held_out=held_out, seconds=seconds, progress=progress).verdict
+
+
+class Outcome(NamedTuple):
+    """A verdict, the search that it stands on, and the probability of every explanation (n,), in the order of
+    `Search.ranked`.
+    """
+
+    verdict: Verdict
+    search: Search
+    probabilities: np.ndarray
+
+
+def outcome(
+    records: Record | Sequence[Record],
+    model: Model,
+    *,
+    held_out: Record | Sequence[Record] = (),
+    seconds: float | None = None,
+    progress: Progress | None = None,
+    screen: bool = False,
+) -> Outcome:
+    """Return a verdict with all explanations; arguments and errors as of `diagnose`. To `screen` is to rank single
+    terms in the linear problem, without a fit of any.
+    """
     if seconds is not None and not seconds > 0.0:
         raise UserError(f"diagnose: seconds is {seconds!r}; it must be greater than 0.")
     end = math.inf if seconds is None else process_time() + seconds
@@ -85,13 +111,13 @@ def diagnose(
     given = [records] if isinstance(records, Record) else list(records)
     kept = [held_out] if isinstance(held_out, Record) else list(held_out)
     with threadpool_limits(limits=1, user_api="blas"):  # matrices are small
-        search, outliers = _searched(model, given, report, end)
+        search, outliers = _searched(model, given, report, end, screen=screen)
         report(0.9, "locks")
-        return _concluded(search, kept, outliers)
+        return Outcome(_concluded(search, kept, outliers), search, _probabilities(search, search.ranked()))
 
 
 def _searched(
-    model: Model, records: Sequence[Record], report: Progress, end: float
+    model: Model, records: Sequence[Record], report: Progress, end: float, *, screen: bool = False
 ) -> tuple[Search, dict[str, int]]:
     """Return the search, which goes on from its best explanation without the outliers that this shows, until some
     processor time [s]; and channel → how many.
@@ -100,7 +126,7 @@ def _searched(
     best: Fit | None = None
     for last in range(PASSES):
         search = Search(Problem(model, records), report, end - process_time(), best)
-        search.run()
+        search.screen() if screen else search.run()
         best = search.ranked()[0]
         outliers = search.problem.outliers(best.terms, best.linear.e)
         if not (outliers and search.complete) or last == PASSES - 1:

@@ -50,7 +50,7 @@ OFF_LEVELS = 3.0
 def declared(problem: Problem) -> list[Term]:
     """Return the terms that a model declares, and those that its channels may have throughout."""
     model = problem.model
-    duration = max(float(np.ptp(record.time)) for record in problem.records)
+    durations = [float(np.ptp(record.time)) for record in problem.records]
     data = [term for term in data_terms(model) if term.target in (*problem.channels, CLOCK)]
     data = [term for term in data if term.kind != "unit" or problem.may_read(term.target, term.factor)]
     inputs = [term for term in input_terms(problem.model) if term.target in problem.moving_inputs]
@@ -67,7 +67,7 @@ def declared(problem: Problem) -> list[Term]:
         else term
         for term in data
     ]
-    return [*cause_terms(model, duration), tolerance_term(model), *data, *inputs]
+    return [*cause_terms(model, durations), tolerance_term(model), *data, *inputs]
 
 
 def suggested(problem: Problem, linear: Linear, terms: list[Term]) -> list[Term]:

@@ -204,21 +204,29 @@ def log_prior(terms: Terms, loggers: dict[str, str]) -> float:
     return total
 
 
-def cause_terms(model: Model, duration: float) -> list[Term]:
-    """Return a term of every cause, and of those that may begin in the middle of a record."""
+def cause_terms(model: Model, durations: Sequence[float]) -> list[Term]:
+    """Return a term of every cause, and of those that may begin in the middle of one of the records.
+
+    Args:
+        model: whose causes they are.
+        durations: of the records. [s]
+    """
     odds = min(PRIOR_CAUSE / max(len(model.causes), 1), MOST_LIKELY)
     found = []
     for cause in model.causes:
         throughout = Term(cause.id, cause.sentence, "cause", cause.id, odds)
-        found += [replace(throughout, size=size) for size in (cause.sizes if cause.numbers else (0.0,))]
-        late = replace(
-            throughout,
-            id=f"{cause.id}@",
-            sentence=f"from some time on, {cause.sentence}",
-            odds=ONSET_ODDS * odds,
-            ends=duration,
-        )
-        found += [replace(late, begins=share * duration) for share in ONSET_SHARES if cause.onset]
+        sizes = cause.sizes if cause.numbers else (0.0,)
+        found += [replace(throughout, size=size) for size in sizes if cause.throughout]
+        for k, duration in enumerate(durations if cause.onset else ()):
+            late = replace(
+                throughout,
+                id=f"{cause.id}@{k if len(durations) > 1 else ''}",
+                sentence=f"from some time on, {cause.sentence}",
+                odds=ONSET_ODDS * odds / len(durations),
+                ends=duration,
+                record=k,
+            )
+            found += [replace(late, begins=share * duration) for share in ONSET_SHARES]
     return found
 
 
@@ -368,14 +376,24 @@ def _spread(name: str, tolerance: float, terms: Sequence[Term], model: Model) ->
 
 def _of_cause(cause: Cause, term: Term) -> list[Entry]:
     found = [
-        Entry("cause", f"{cause.id}.{name}", number.nominal, number.tolerance, -1, number.low, number.high)
+        Entry(
+            "cause",
+            f"{cause.id}.{name}",
+            number.nominal,
+            number.tolerance,
+            term.record,
+            number.low,
+            number.high,
+        )
         for name, number in cause.numbers.items()
     ]
     if math.isfinite(term.begins):
-        found += [Entry("change", f"{cause.id}.{name}", 0.0, size) for name, size in cause.changes.items()]
-        found.append(
-            Entry("since", cause.id, term.begins, term.ends / math.sqrt(2.0 * math.pi), -1, 0.0, term.ends)
-        )
+        found += [
+            Entry("change", f"{cause.id}.{name}", 0.0, size, term.record)
+            for name, size in cause.changes.items()
+        ]
+        spread = term.ends / math.sqrt(2.0 * math.pi)
+        found.append(Entry("since", cause.id, term.begins, spread, term.record, 0.0, term.ends))
     return found
 
 

@@ -166,6 +166,7 @@ class Cause:
         numbers: of the effect, when it acts.
         off: numbers for which it does nothing.
         onset: whether the function uses ``since``.
+        throughout: whether it may hold throughout; one with an onset may not, such as a growth.
         sizes: where a search begins: standard deviations of all its numbers from their nominal values.
     """
 
@@ -177,10 +178,11 @@ class Cause:
         changes: Mapping[str, float] | None = None,
         off: Mapping[str, float] | None = None,
         onset: bool = False,
+        throughout: bool = True,
         sizes: Sequence[float] = (0.0, -1.0, 1.0),
         **numbers: Number,
     ) -> None:
-        self.id, self.sentence, self.onset = id, sentence, onset
+        self.id, self.sentence, self.onset, self.throughout = id, sentence, onset, throughout
         self.sizes = tuple(finite(f"a size of the cause {id!r}", size) for size in sizes)
         self.changes = {
             name: positive(f"the change of {name!r} in the cause {id!r}", size)

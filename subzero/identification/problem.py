@@ -368,7 +368,7 @@ class Problem:
         each = self.readings_of(name, terms)
         values = each.values.copy()
         for term in self._errors(name, terms):
-            at = self._where(each, term)
+            at = self.where(each, term)
             values[at] = (values[at] - term.offset) / term.factor
         return values
 
@@ -392,7 +392,7 @@ class Problem:
         }
         values = free.get("offset", 0.0) + (1.0 + free.get("gain", 0.0)) * simulated
         for term in self._errors(name, terms):
-            at = self._where(each, term)
+            at = self.where(each, term)
             if term.kind == "drift":
                 values[at] += free["drift"] * self._ramp(each)[at]
             elif term.kind == "offset" and "step" in free:
@@ -415,12 +415,12 @@ class Problem:
             if term.kind == "stuck":
                 total -= self._log_equal(each, term)
             else:
-                total -= int((self._where(each, term) & each.used).sum()) * np.log(abs(term.factor))
+                total -= int((self.where(each, term) & each.used).sum()) * np.log(abs(term.factor))
         return float(total)
 
     def _log_equal(self, each: Readings, term: Term) -> float:
         """Return the log probability that readings of a time are equal, as neighbours are in the rest of the record."""
-        at = self._where(each, term)
+        at = self.where(each, term)
         inside, equal = at[1:] & at[:-1], np.diff(each.values) == 0.0
         rest = (equal[~inside].sum() + 1.0) / ((~inside).sum() + 2.0)
         return float(equal[inside].sum() * np.log(rest))
@@ -428,7 +428,7 @@ class Problem:
     def used(self, name: str, terms: Terms) -> np.ndarray:
         """Return which readings of a channel an explanation uses (m,)."""
         each = self.readings_of(name, terms)
-        stuck = [self._where(each, term) for term in terms if term.kind == "stuck" and term.target == name]
+        stuck = [self.where(each, term) for term in terms if term.kind == "stuck" and term.target == name]
         return each.used & ~np.any(stuck, axis=0) if stuck else each.used
 
     def steps(self, entries: Sequence[Entry], x: np.ndarray) -> np.ndarray:
@@ -514,7 +514,8 @@ class Problem:
                 found[at] += np.concatenate([[0.0], np.cumsum(steps)]) - (found[at] - found[at[0]])
         return found
 
-    def _where(self, each: Readings, term: Term) -> np.ndarray:
+    def where(self, each: Readings, term: Term) -> np.ndarray:
+        """Return which readings of a channel (m,) an error in the data is about."""
         of = np.ones(each.time.size, dtype=bool) if term.record < 0 else each.record == term.record
         spans = term.spans or ((term.begins, term.ends),)
         return of & np.any([(each.time >= first) & (each.time <= last) for first, last in spans], axis=0)

@@ -138,18 +138,29 @@ class Search:
         return float(logsumexp(scores)) if scores else -math.inf
 
     def run(self) -> None:
-        """Search until no move gains, or the time is over."""
+        """Search until no move gains, the time is over, or the user interrupts it: what was found is kept."""
         try:
             self._run()
         except _TimeOverError:
             self.complete = False
+        except KeyboardInterrupt:
+            if not self.fits:
+                raise
+            self.complete = False
+
+    def screen(self) -> None:
+        """Rank all single terms in the linear problem around the fit of "nothing is wrong"."""
+        self._fit_additions(self._fit(self._nominal()).linear, most=0)
+        self.complete = False
+
+    def _nominal(self) -> Linear:
+        """Return the nominal model, linearised."""
+        problem, entries = self.problem, self.problem.entries(())
+        centre = np.array([entry.centre for entry in entries])
+        return linearised(problem, (), entries, centre, usual_levels(problem, ()), must=True)
 
     def _run(self) -> None:
-        problem, levels = self.problem, usual_levels(self.problem, ())
-        entries = problem.entries(())
-        nominal = linearised(
-            problem, (), entries, np.array([entry.centre for entry in entries]), levels, must=True
-        )
+        problem, nominal = self.problem, self._nominal()
         self._fit(nominal)
         if (fitted := self.begin) is None:
             self._fit(self._greedy(nominal))
@@ -239,14 +250,14 @@ class Search:
         ranked = self._distinct(sorted(found, key=lambda pair: -pair[0]))[:FITTED]
         return [self._fit(linear, score) for score, linear in ranked if score > self.score(base) - WITHIN]
 
-    def _fit_additions(self, base: Linear) -> None:
+    def _fit_additions(self, base: Linear, most: int = FITTED) -> None:
         """Fit the best explanations with one term more, except those that are ranked far below the best of all fits.
 
         What is ranked like the first of them is fitted, too, however well that one does: a rank is of the linear
         problem, which may be too strict with all of them, and twins have one rank.
         """
         here, added = self._linear_score(base), self._best_additions(base)[:FITTED]
-        for score, linear in added:
+        for score, linear in added[:most]:
             if score > max(here - WORTH, min(self.score(self.ranked()[0]), added[0][0]) - WITHIN):
                 self._fit(linear, score)
 

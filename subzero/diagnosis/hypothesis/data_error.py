@@ -4,11 +4,13 @@ Each is a transformation of the record, or of the recorded commands, and so need
 
     sign, unit, reference        y = ±x, a x, a₀ ± x of a channel (a compass that is turned, or counts the other way)
     step                         y = x + a from a time on
+    affine                       y = a + b x, with any a and b
     frozen, dropout              a value that is repeated: from a time on, or here and there
     swapped                      two channels with each other's values
     late_clock, clock_rate       t = t′ + δ, (1 + ρ) t′ of all channels
     latency                      t = t′ + δ of one channel
     command_sign, command_swap   commands with the other sign, or in each other's column
+    command_unit                 a command in another unit
 
 `DataError.corrected` undoes the error in a record, and `DataError.planted` makes it. Probabilities of records are
 compared as they were written, so that y = a x costs log|a| a sample (`DataError.log_jacobian`).
@@ -75,10 +77,11 @@ class DataError:
         kind: a row of `KINDS`.
         channels: affected channels; none for a clock, groups of `COMMAND_GROUPS` for commands.
         how: which variant: a unit of `MISTAKEN`, a row of `REFERENCES`; "" where there is only one.
-        amount: of a step [unit of the channel], a delay [s] or a rate [1].
+        amount: of a step or a regression [unit of the channel], a delay [s] or a rate [1].
         since: time from which on it holds. [s]
         at: samples that hold no measurement, by their times; of frozen values and drop-outs. [s]
         amount_sd: standard deviation of the amount; 0 where it is not known.
+        scale: of a regression y = amount + scale x. [-]
     """
 
     kind: str
@@ -88,6 +91,7 @@ class DataError:
     since: float = 0.0
     at: tuple[float, ...] = ()
     amount_sd: float = 0.0
+    scale: float = 1.0
 
     @property
     def id(self) -> str:
@@ -103,7 +107,7 @@ class DataError:
     @property
     def is_of_commands(self) -> bool:
         """It is an error of the commands, not of the measurements."""
-        return self.kind in ("command_sign", "command_swap")
+        return self.kind in ("command_sign", "command_swap", "command_unit")
 
     @property
     def is_of_clock(self) -> bool:
@@ -113,7 +117,7 @@ class DataError:
     @property
     def columns(self) -> tuple[str, ...]:
         """The columns of the record that it affects."""
-        if self.is_of_commands:
+        if self.is_of_commands and self.kind != "command_unit":
             return tuple(BY_NAME[error].column for group in self.channels for error in COMMAND_GROUPS[group])
         return tuple(BY_NAME[channel].column for channel in self.channels) or ("time_s",)
 
@@ -149,11 +153,8 @@ Words = Callable[[DataError], str]
 
 
 class Kind(NamedTuple):
-    """A kind of error: its share of all errors, functions that correct and plant it, its description and its
-    remedy.
-    """
+    """A kind of error: functions that correct and plant it, its description and its remedy."""
 
-    share: float
     correct: Change
     plant: Change
     sentence: Words
@@ -222,6 +223,14 @@ def _without_step(error: DataError, time: np.ndarray, values: np.ndarray) -> np.
 
 def _with_step(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.where(time >= error.since, values + error.amount, values)
+
+
+def _without_regression(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return (values - error.amount) / error.scale
+
+
+def _with_regression(error: DataError, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return error.amount + error.scale * values
 
 
 def _among(error: DataError, time: np.ndarray) -> np.ndarray:
@@ -350,6 +359,21 @@ def _commands_turned(error: DataError, logged: Logged) -> Logged:
     return _with_commands(logged, values)
 
 
+def _commands_scaled(error: DataError, logged: Logged) -> Logged:
+    return _commands_times(error, logged, error.scale)
+
+
+def _commands_right(error: DataError, logged: Logged) -> Logged:
+    return _commands_times(error, logged, 1.0 / error.scale)
+
+
+def _commands_times(error: DataError, logged: Logged, factor: float) -> Logged:
+    assert logged.setting.trial.commands is not None
+    values = logged.setting.trial.commands.values.copy()
+    values[:, [COMMANDS.index(name) for name in error.channels]] *= factor
+    return _with_commands(logged, values)
+
+
 def _commands_exchanged(error: DataError, logged: Logged) -> Logged:
     assert logged.setting.trial.commands is not None
     old = logged.setting.trial.commands.values
@@ -398,28 +422,24 @@ def _reference_remedy(error: DataError) -> str:
 
 KINDS: Mapping[str, Kind] = {
     "sign": Kind(
-        0.15,
         _values(_negative),
         _values(_negative),
         lambda suspect: f"{_both(suspect)} has the other sign",
         lambda suspect: f"change its sign ({BY_NAME[suspect.channels[0]].long_name})",
     ),
     "unit": Kind(
-        0.2,
         _values(_in_right_unit),
         _values(_in_wrong_unit),
         lambda suspect: f"{_both(suspect)} is in {suspect.how}",
         _unit_remedy,
     ),
     "reference": Kind(
-        0.1,
         _values(_to_north),
         _values(_from_reference),
         lambda suspect: f"{_both(suspect)} {suspect.how}",
         _reference_remedy,
     ),
     "step": Kind(
-        0.05,
         _values(_without_step),
         _values(_with_step),
         lambda suspect: (
@@ -432,14 +452,12 @@ KINDS: Mapping[str, Kind] = {
         ),
     ),
     "frozen": Kind(
-        0.08,
         _values(_as_gaps),
         _values(_repeated),
         lambda suspect: f"{_both(suspect)} is frozen from {suspect.since:.3g} s on",
         lambda suspect: f"leave its cells empty from {suspect.since:.3g} s on",
     ),
     "dropout": Kind(
-        0.1,
         _values(_as_gaps),
         _values(_repeated),
         lambda suspect: (
@@ -448,15 +466,30 @@ KINDS: Mapping[str, Kind] = {
         ),
         lambda suspect: "leave these cells empty",
     ),
+    "affine": Kind(
+        _values(_without_regression),
+        _values(_with_regression),
+        lambda suspect: (
+            f"{_both(suspect)} shows {suspect.scale:.4g} times what it should"
+            f"{f', and {suspect.amount:+.3g} {BY_NAME[suspect.channels[0]].unit}' if suspect.amount else ''}"
+        ),
+        lambda suspect: (
+            f"{f'subtract {suspect.amount:.3g}, and ' if suspect.amount else ''}divide it by {suspect.scale:.4g}"
+        ),
+    ),
+    "command_unit": Kind(
+        _commands_right,
+        _commands_scaled,
+        lambda suspect: f"{_both(suspect)} is {suspect.scale:.4g} times what was commanded",
+        lambda suspect: f"divide it by {suspect.scale:.4g}",
+    ),
     "swapped": Kind(
-        0.08,
         _exchanged,
         _exchanged,
         lambda suspect: f"{_both(suspect)} have each other's values",
         lambda suspect: "exchange the headers of the two columns",
     ),
     "late_clock": Kind(
-        0.08,
         _earlier,
         _later,
         lambda suspect: (
@@ -469,7 +502,6 @@ KINDS: Mapping[str, Kind] = {
         ),
     ),
     "clock_rate": Kind(
-        0.03,
         _slower,
         _faster,
         lambda suspect: (
@@ -479,7 +511,6 @@ KINDS: Mapping[str, Kind] = {
         lambda suspect: f"divide time_s by {1.0 + suspect.amount:.4g}",
     ),
     "latency": Kind(
-        0.05,
         _in_time,
         _delayed,
         lambda suspect: (
@@ -489,26 +520,22 @@ KINDS: Mapping[str, Kind] = {
         lambda suspect: f"shift that column by {-suspect.amount:+.3g} s",
     ),
     "command_sign": Kind(
-        0.05,
         _commands_turned,
         _commands_turned,
         lambda suspect: f"the command of the {_groups(suspect)} has the other sign",
         lambda suspect: "change the sign of that command",
     ),
     "command_swap": Kind(
-        0.03,
         _commands_exchanged,
         _commands_exchanged,
         lambda suspect: f"the commands of the {_groups(suspect)} are in each other's columns",
         lambda suspect: "exchange these columns of the commands",
     ),
 }
-"""Kind → its definition; shares sum to one."""
+"""Kind → its definition."""
 
 REPEATED = ("frozen", "dropout")
 """Kinds that are read off a record as it was written."""
-ANY = 0.1
-"""Prior probability that a record has an error in its data."""
 
 
 def corrected(logged: Logged, errors: tuple[DataError, ...]) -> Logged:

@@ -1,30 +1,20 @@
-"""Latent forces and sensor drifts: candidates by linear evidence, histories, and a linearisation at their own fit.
+"""Latent forces and sensor drifts over time, with their bands.
 
     w ~ Gaussian process(a, T) on one axis;   a and T are those that make the record most probable
 
-`latent_force_candidates` compares axes and channels in the linear problem around a fit. `estimate_force` fits the
-history with simulations, all tolerances free, and gives its band. `relinearised_force` computes the evidence again at
-that fit: without the force, all tolerances have to deviate from their priors to come close to a record, and a
-linearisation there is inaccurate for a model that is as declared but for the force. Not modelled: forces on two axes.
+`estimate_force` fits the history with simulations, all tolerances free, and gives its band.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from subzero.channels import BY_NAME
-from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.diagnosis.hypothesis.hypotheses import Ids, log_prior, nameable, variances
-from subzero.diagnosis.inference.change_point_scan import BaseRun, LinearisationPoint
 from subzero.diagnosis.inference.latent_force import (
-    DRIFT,
     FINE_SPACING_S,
-    FORCE,
-    MAX_DRIFT_LEVELS,
     Knots,
     drift_columns,
     force_columns,
@@ -34,150 +24,22 @@ from subzero.diagnosis.inference.latent_force import (
     with_force,
 )
 from subzero.diagnosis.inference.linear_gaussian import (
-    AMPLITUDE_SHARES,
-    CORRELATION_TIMES,
-    KAPPAS,
     ForceInformation,
-    Linear,
     Posterior,
     ProcessShape,
     Quadratic,
-    Scale,
-    Scales,
-    Terms,
     correlation,
-    log_evidence_process,
-    log_evidence_term,
     log_gains,
-    log_sum,
-    mixed,
     modes,
     posterior,
     seen,
 )
-from subzero.diagnosis.inference.map_fit import Fit, is_poor_fit, possible, refit, with_own_jacobian
-from subzero.diagnosis.inference.posing import rewhitened, whitened_again
+from subzero.diagnosis.inference.map_fit import Fit, refit, with_own_jacobian
 from subzero.diagnosis.results import Unknown
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.inference.problem import Problem
     from subzero.external_force import MissingForce
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class LatentForceCandidate:
-    """A force or a drift in the linear problem.
-
-    Attributes:
-        id: "unknown_force:X", "sensor_drift:heading".
-        log_gain: log evidence over that of none; amplitudes, correlation times, formulas of one term and κ mixed.
-        kappa: the most probable κ.
-        fit: the linearisation point.
-        columns: sensitivities to the history at its knots (m, n).
-        knots: of the history.
-        terms: axis → formulas of one term for a force on it, as alternatives to a process.
-    """
-
-    id: str
-    log_gain: float
-    kappa: float
-    fit: Fit
-    columns: np.ndarray
-    knots: Knots
-    terms: Mapping[str, Terms]
-
-    def whitened_anew(self, before: Problem, after: Problem) -> LatentForceCandidate:
-        """Return the candidate, whitened with the noise of one problem, whitened with that of another."""
-        fit, columns = rewhitened(self.fit, before, after), whitened_again(before, after, self.columns)
-        return replace(self, fit=fit, columns=columns)
-
-    def log_evidence(self, problem: Problem, causes: Ids) -> float:
-        """Return its log evidence in addition to causes, in the linear problem whitened with the noise of a
-        problem.
-        """
-        D = variances(problem.entries, causes, self.kappa)
-        data = _seen(self.fit, D, self.columns)
-        gain = _log_gain(problem, self.id, data, self.knots, self.terms)
-        return posterior(self.fit.quadratic, D).log_evidence + gain
-
-    def linear(self, problem: Problem, causes: Ids) -> tuple[Linear, np.ndarray]:
-        """Return its linear problem in addition to causes, with the modes of the most probable history, and the prior
-        variances of all parameters (k,).
-        """
-        D, size = variances(problem.entries, causes, self.kappa), max(_amplitudes(problem, self.id))
-        return self._with_modes(_best_modes(_seen(self.fit, D, self.columns), self.knots, size), D)
-
-    def linear_at_most(self, problem: Problem, causes: Ids) -> tuple[Linear, np.ndarray]:
-        """Return the same with the modes of the largest and quickest possible history."""
-        largest = ProcessShape(max(_amplitudes(problem, self.id)), min(CORRELATION_TIMES))
-        L = modes(self.knots.time, self.knots.record, largest)
-        return self._with_modes(L, variances(problem.entries, causes, self.kappa))
-
-    def _with_modes(self, L: np.ndarray, D: np.ndarray) -> tuple[Linear, np.ndarray]:
-        J = np.hstack([self.fit.J, self.columns @ L])
-        return Linear(self.fit.r + self.fit.J @ self.fit.z, J), np.concatenate([D, np.ones(L.shape[1])])
-
-
-def latent_force_candidates(
-    problem: Problem,
-    columns: Mapping[str, np.ndarray],
-    fit: Fit,
-    scales: Scales,
-    knots: Knots,
-    terms: Mapping[str, Terms] | None = None,
-) -> list[LatentForceCandidate]:
-    """Return every force and drift of `columns` (id → (m, n)), in the linear problem around a fit, most probable
-    first.
-
-    Args:
-        problem: of the columns.
-        columns: as of `all_columns`.
-        fit: the linearisation point, close to that of the columns.
-        scales: κ → its log weight and the prior variances of the entries.
-        knots: of the columns.
-        terms: axis → formulas of one term for a force on it, as alternatives to a process.
-    """
-    q, whole = fit.quadratic, fit.r + fit.J @ fit.z
-    found = []
-    for name, C in columns.items():
-        gains = {
-            kappa: _log_gain(problem, name, seen(q.A, q.b, scale.D, fit.J, C, whole), knots, terms or {})
-            for kappa, scale in scales.items()
-        }
-        gain, kappa = mixed(scales, gains)
-        found.append(
-            LatentForceCandidate(
-                id=name, log_gain=gain, kappa=kappa, fit=fit, columns=C, knots=knots, terms=terms or {}
-            )
-        )
-    return sorted(found, key=lambda each: -each.log_gain)
-
-
-def _log_gain(
-    problem: Problem, name: str, data: ForceInformation, knots: Knots, terms: Mapping[str, Terms]
-) -> float:
-    """Return the log evidence of a force or a drift over that of none: a process and a formula with equal priors,
-    mixed.
-    """
-    amplitudes, axis = _amplitudes(problem, name), name.partition(":")[2]
-    process = log_evidence_process(data, knots.time, knots.record, amplitudes, drift=name.startswith(DRIFT))
-    if name.startswith(DRIFT) or axis not in terms:
-        return process
-    return log_sum([process, log_evidence_term(data, terms[axis], amplitudes)]) - float(np.log(2.0))
-
-
-def _amplitudes(problem: Problem, name: str) -> list[float]:
-    """Return the amplitudes of the mixture for a force or a drift."""
-    kind, _, which = name.partition(":")
-    if kind + ":" == FORCE:
-        return amplitude_grid(problem.records[0].setting, which)
-    return [share * MAX_DRIFT_LEVELS * SPECS[which].noise for share in AMPLITUDE_SHARES]
-
-
-def amplitude_grid(setting: Setting, axis: str) -> list[float]:
-    """Return the amplitudes of the mixture. [N, N m]"""
-    return [share * typical_force(setting, axis) for share in AMPLITUDE_SHARES]
 
 
 CORRELATION_TIMES_S = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0)
@@ -320,75 +182,6 @@ def _estimated(axis: str, problem: Problem, fit: Fit, D: np.ndarray, found: Hist
     )
 
 
-class RelinearisedForce(NamedTuple):
-    """A force or a drift around its own fit.
-
-    Attributes:
-        log_posterior: without causes, but for its own prior.
-        what: the candidate.
-        point: the linear problem there, without it, and the simulation, with it.
-        is_poor: it does not explain the records.
-    """
-
-    log_posterior: float
-    what: LatentForceCandidate
-    point: LinearisationPoint
-    is_poor: bool
-
-
-def relinearised_force(
-    problem: Problem, start: Fit, name: str, kappa: float, knots: Knots, terms: Mapping[str, Terms]
-) -> RelinearisedForce:
-    """Return a force or a drift without causes, around its own fit.
-
-    Args:
-        problem: records and parameters.
-        start: a fit close to the records.
-        name: "unknown_force:X", "sensor_drift:heading".
-        kappa: how wide the tolerances are in the fit.
-        knots: of its history.
-        terms: axis → formulas of one term for a force on it.
-    """
-    D, which = variances(problem.entries, (), kappa), name.partition(":")[2]
-    if name.startswith(FORCE):
-        found = estimate_force(problem, start, which, D, spacing=knots.spacing, most_fresh=0)
-        done = found.fit
-    else:
-        found = estimate_drift(problem, start, which, MAX_DRIFT_LEVELS * SPECS[which].noise, D)
-        knots, done = found.knots, fit_with_drift(problem, found, D)
-    fit = _without(found, done, D.size)
-    ((log, what),) = linear_candidates(problem, fit, {name: found.columns}, knots, terms, [kappa])
-    point = LinearisationPoint(fit=fit, along=BaseRun(found.problem, done.z))
-    return RelinearisedForce(log + _possible(problem, done), what, point, is_poor_fit(done))
-
-
-def linear_candidates(
-    problem: Problem,
-    fit: Fit,
-    columns: Mapping[str, np.ndarray],
-    knots: Knots,
-    terms: Mapping[str, Terms],
-    kappas: Sequence[float],
-) -> list[tuple[float, LatentForceCandidate]]:
-    """Return the log posteriors of forces without causes in the linear problem around a fit, and the forces.
-
-    A fit is a poor linearisation point for tolerances wider than its own: with those the model would rather deviate
-    from its priors.
-    """
-    D = {kappa: variances(problem.entries, (), kappa) for kappa in kappas}
-    log = {
-        kappa: float(np.log(KAPPAS[kappa])) + posterior(fit.quadratic, D[kappa]).log_evidence
-        for kappa in kappas
-    }
-    total = log_sum(list(log.values()))
-    scales = {kappa: Scale(log[kappa] - total, D[kappa]) for kappa in kappas}
-    total += log_prior((), len(nameable(problem.entries)))
-    return [
-        (total + candidate.log_gain, candidate)
-        for candidate in latent_force_candidates(problem, columns, fit, scales, knots, terms)
-    ]
-
-
 def fit_with_drift(problem: Problem, found: EstimatedForce, D: np.ndarray) -> Fit:
     """Return the fit of the records without a drift, under prior variances D (k,)."""
     start, channel, records = found.fit, found.unknown.axis, []
@@ -401,27 +194,3 @@ def fit_with_drift(problem: Problem, found: EstimatedForce, D: np.ndarray) -> Fi
     there = posterior(Quadratic(A=J.T @ J, b=J.T @ left, rr=float(left @ left)), D).z
     done = refit(cleared, there, J, D, most_fresh=1, made_at=start.made_at)
     return with_own_jacobian(cleared, done)
-
-
-def _without(found: EstimatedForce, done: Fit, count: int) -> Fit:
-    """Return the fit of a problem with a force, or with a drift, as a fit of the entries before it: with the residual
-    without the force or drift.
-    """
-    z, D, r = done.z[:count], done.D[:count], done.r + found.columns @ found.force
-    objective = 0.5 * float(r @ r) + 0.5 * float(np.sum(z * z / D))
-    return Fit(
-        z=z,
-        r=r,
-        J=done.J[:, :count],
-        D=D,
-        objective=objective,
-        converged=done.converged,
-        predicted_gain=0.0,
-        fresh=done.fresh,
-    )
-
-
-def _possible(problem: Problem, done: Fit) -> float:
-    """Return the correction of the log evidence because some values cannot be below 0."""
-    count, free = len(problem.entries), posterior(done.quadratic, done.D)
-    return possible(problem.entries, range(count), free.z[:count], np.sqrt(np.diag(free.M)[:count]))

@@ -4,7 +4,7 @@
 
 An effect like any other: its parameters are the knots f_k, or modes x of the process (f = L x, x ~ N(0, I)), so that
 sensitivities and fits are those of `problem` and `map_fit`. Records have histories of their own. A drift is the same
-in one channel, without a simulation. `input_estimation` computes the evidence of both.
+in one channel, without a simulation. `input_estimation` estimates both.
 
 A Gaussian process costs evidence for every second in which it is free to change; a drag that grows all the time, or a
 push that lasts for some seconds, has one number. So there is a dictionary of formulas, with prior probabilities:
@@ -13,7 +13,7 @@ push that lasts for some seconds, has one number. So there is a dictionary of fo
     or  cos ωt, sin ωt                        (Λ: rising to the middle, and falling)
 
 Features are those of `external_force`, along a fitted track; those that usually act along an axis have a larger
-prior. `one_terms` gives the formulas of one term.
+prior.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ import vehicle
 from subzero.diagnosis.hypothesis.configuration import LENGTH, RUDDER, WATER
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter
 from subzero.diagnosis.hypothesis.hypotheses import Entry
-from subzero.diagnosis.inference.linear_gaussian import Terms, log_sum
 from subzero.diagnosis.inference.simulator import simulate_track
 from subzero.diagnosis.results import WAVE
 from subzero.external_force import AXES, FACTORS, FEATURES, MissingForce, feature_value, fill_factors
@@ -171,13 +170,6 @@ def drift_columns(problem: Problem, channel: str, knots: Knots) -> np.ndarray:
         hats = np.maximum(1.0 - apart, 0.0) * own
         rows += [noise.whiten(hats if name == channel else 0.0 * hats) for name, noise in each.noise.items()]
     return np.concatenate(rows)
-
-
-def all_columns(problem: Problem, z: np.ndarray, knots: Knots) -> dict[str, np.ndarray]:
-    """Return id → columns of a force on every axis and of a drift of every channel."""
-    forces = {FORCE + axis: C for axis, C in force_columns(problem, z, AXES, knots).items()}
-    channels = problem.records[0].noise
-    return {**forces, **{DRIFT + channel: drift_columns(problem, channel, knots) for channel in channels}}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -384,34 +376,3 @@ def shape_weight(shape: Shape, axis: str) -> float:
     """Return the log prior of a shape along an axis, up to a common constant."""
     odd = WAVE_PRIOR if shape.feature == WAVE else ODD_FEATURE_PRIOR
     return shape.log_prior + (0.0 if shape.feature in SENSIBLE_FEATURES[axis] else float(np.log(odd)))
-
-
-def one_terms(problem: Problem, z: np.ndarray, knots: Knots) -> Mapping[str, Terms]:
-    """Return axis → formulas of one term, each in one record, along the runs of z."""
-    records = range(len(problem.records))
-    parts = [_of_record(problem, z, knots, record) for record in records]
-    phi = np.concatenate([record for record, _ in parts], axis=1)
-    return {axis: Terms(phi, _normal([weights[axis] for _, weights in parts])) for axis in AXES}
-
-
-def _of_record(
-    problem: Problem, z: np.ndarray, knots: Knots, record: int
-) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return the terms of a record at all knots (n, terms, 2), 0 in other records, and axis → log weights
-    (terms,).
-    """
-    own = knots.record == record
-    times = samples_of(float(knots.time[own][-1]))
-    shapes = all_shapes(factors_along(problem.setting(record, z), times), times)
-    phi, to_knots = np.zeros((knots.time.size, len(shapes), 2)), at_knots(times, knots.time[own])
-    for column in (0, 1):
-        having = [i for i, shape in enumerate(shapes) if shape.columns.shape[1] > column]
-        known = np.column_stack([shapes[i].columns[:, column] / size_of(shapes[i]) for i in having])
-        phi[np.ix_(own, having, [column])] = (to_knots @ known)[:, :, None]
-    return phi, {axis: np.array([shape_weight(shape, axis) for shape in shapes]) for axis in AXES}
-
-
-def _normal(weights: list[np.ndarray]) -> np.ndarray:
-    """Return log weights, normalised to a sum of weights of 1."""
-    every = np.concatenate(weights)
-    return every - log_sum(every)

@@ -19,7 +19,14 @@ from scenarios.heading import turned
 from subzero.channels import HEADING
 from subzero.diagnosis.hypothesis.catalogue import ONSETS, SAMPLED, START, catalogue
 from subzero.diagnosis.hypothesis.catalogue.sensors import CLOCK, SPECS
-from subzero.diagnosis.hypothesis.hypotheses import entries_of, is_absent, moves_nothing, with_tolerances
+from subzero.diagnosis.hypothesis.effect import with_free_onset
+from subzero.diagnosis.hypothesis.hypotheses import (
+    Entry,
+    entries_of,
+    is_absent,
+    moves_nothing,
+    with_tolerances,
+)
 from subzero.diagnosis.hypothesis.noise import (
     Noise,
     SensorPrior,
@@ -29,14 +36,12 @@ from subzero.diagnosis.hypothesis.noise import (
     spikes,
 )
 from subzero.diagnosis.hypothesis.noise_estimate import ResidualNoise, estimate
-from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.map_fit import Fit, bounded_step, bounds, objective
+from subzero.diagnosis.inference.map_fit import CONVERGED_GAIN_NATS, Fit, bounded_step, bounds, objective
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import economical, finer, read, respond, with_limit
 from subzero.errors import UserError
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.hypothesis.configuration import Setting
     from subzero.diagnosis.hypothesis.effect import Effect
     from subzero.diagnosis.hypothesis.logged import Logged
 
@@ -85,31 +90,13 @@ def pose(records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
     return Problem(records=observed, entries=entries_of(effects, own, len(observed)), onsets=onsets)
 
 
-def posed_again(problem: Problem, records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
-    """Return the problem of records that were changed; simulations of the records as they were that still hold are
-    not run again.
-
-    Args:
-        problem: of the records as they were, as posed.
-        records: as they are now.
-        more: causes besides the catalogue.
-
-    Raises:
-        UserError: the nominal model cannot be run through a trial.
+def with_change_point(problem: Problem, effect: Effect, time: float, record: int) -> Problem:
+    """Return the problem with the parameters of an effect that begins at a time [s] of a record, and its onset,
+    appended to its entries.
     """
-    new = pose(records, more)
-    if [list(record.noise) for record in new.records] != [list(record.noise) for record in problem.records]:
-        return new
-    pairs = zip(problem.records, new.records, strict=True)
-    known = tuple(replace(b, setting=a.setting) if _serves(a.setting, b.setting) else b for a, b in pairs)
-    return replace(problem, records=known, kept=problem.kept.again())
-
-
-def _serves(setting: Setting, other: Setting) -> bool:
-    """Say whether simulations of a setting hold for another of the same trial: the same commands, and at least as
-    long.
-    """
-    return setting.trial.commands is other.trial.commands and setting.trial.duration >= other.trial.duration
+    begins = with_free_onset(effect, time, float(problem.records[record].time[-1]))
+    more = tuple(Entry(begins, i, record) for i in range(len(begins.parameters)))
+    return replace(problem, entries=(*problem.entries, *more))
 
 
 def _possible(effect: Effect, observed: Sequence[Observed]) -> bool:
@@ -214,7 +201,7 @@ def rewhitened(fit: Fit, before: Problem, after: Problem) -> Fit:
     r, J = whitened_again(before, after, fit.r), whitened_again(before, after, fit.J)
     now, step = objective(r, fit.z, fit.D), bounded_step(J, r, fit.z, fit.D, *bounds(after))
     left = now - objective(r - J @ step, fit.z + step, fit.D)
-    converged = left < settings.CONVERGED_GAIN_NATS
+    converged = left < CONVERGED_GAIN_NATS
     return replace(
         fit, r=r, J=J, objective=now, converged=converged, predicted_gain=0.0 if converged else left
     )

@@ -1,324 +1,307 @@
-"""From findings to the verdict: the decision, named causes, rivals, and words; a pure function of findings.
+"""From the explanations of a search to the verdict on a trial.
 
-    findings, distances → decision → follow-up (simulations, `follow_up`) → verdict
-
-The named explanation is reported with the remaining models: hypotheses and change points that the records allow, each
-with its distance D. No simulation and no fit is made here.
+pool, named terms → records without errors in their data → fits → causes, rivals, extended model → gain, next trial
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
+import numpy as np
+
+from subzero.diagnosis.assessment import Fitted, misfits
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
-from subzero.diagnosis.hypothesis.hypotheses import PRACTICAL_TOLERANCES_SUDDEN
-from subzero.diagnosis.inference.linear_gaussian import KAPPAS
-from subzero.diagnosis.inference.model_average import (
-    HEALTHY_PROBABILITY,
-    ChangePointSummary,
-    credible_set,
-    decide,
-    is_near,
-    qualified,
-    tolerance_scale,
+from subzero.diagnosis.hypothesis.data_error import DataError
+from subzero.diagnosis.hypothesis.effect import Effect
+from subzero.diagnosis.hypothesis.hypotheses import Ids
+from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.inference import (
+    AXIS_WORDS,
+    Problem,
+    Progress,
+    respond,
+    sensitive_runs,
+    with_finer_steps,
 )
 from subzero.diagnosis.results import (
     CALIBRATED,
     CAUSE_NAMED,
+    DATA_ERROR,
     NOTHING_NEAR,
     NOTHING_WRONG,
     OUTSIDE,
     UNDECIDED,
     Cause,
-    Curves,
-    Gain,
-    NextTrial,
+    Detectability,
+    FoundError,
     Rival,
     Unknown,
     Verdict,
 )
-from subzero.diagnosis.verdict.estimates import (
-    OUTSIDE_SENTENCES,
-    causes,
-    closest_rival,
-    deviations,
-    force_rival,
-    most_probable_force,
-    name,
-    names_of,
-    practical_of,
-    rival_of,
-    rivals,
+from subzero.diagnosis.verdict.estimates import between, cause_of, deviations, extended_by, name
+from subzero.diagnosis.verdict.follow_up import Report, follow_up
+from subzero.diagnosis.verdict.pool import (
+    WIDE,
+    Explanation,
+    best_of,
+    fitted,
+    pool_of,
+    posed,
+    without_errors,
 )
+from subzero.diagnosis.verdict.terms import DRIFT, FORCE, id_of
+from subzero.identification.api import UNSEEN, Outcome
 
-if TYPE_CHECKING:
-    import numpy as np
-
-    from subzero.diagnosis.hypothesis.hypotheses import Entry, Ids
-    from subzero.diagnosis.inference import Candidate
-    from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
-    from subzero.diagnosis.inference.out_of_catalogue import Findings
-    from subzero.diagnosis.verdict.estimates import Extension
-
-LISTED_PROBABILITY = 1e-4
-"""Hypotheses that are less probable than this are not listed."""
-
-
+LISTED_PROBABILITY, RIVAL_PROBABILITY = 1e-4, 0.01
+"""Explanations that are less probable are not listed, and are no rivals of the reported one."""
+MAX_RIVALS, MAX_FITTED = 8, 4
+"""Most rivals, and most of them that are fitted as the reported explanation is."""
+MOST = 1.0 - 1e-9
+"""Largest probability of an error in the data."""
 USUAL_NOISE_RATIO = (0.6, 1.6)
 """Range of the noise of a usual sensor, over its specification."""
 
 
-class ClosestRival(NamedTuple):
-    """The closest rival of an explanation: the squared distance D to it, and its causes; () for the tolerances."""
-
-    discrimination: float = 0.0
-    ids: Ids = ()
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Ranked:
-    """All explanations by their probability, and the closest rival of the first of each kind.
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What a diagnosis was asked.
 
     Attributes:
-        inside: hypothesis → probability; with those of explanations out of the catalogue they sum to 1.
-        outside: a latent force, a drift or a change point, last, with the causes that it is added to → probability.
-        best: the most probable hypothesis that has a fit.
-        close_to_best: the closest rival of its causes of a practical size.
-        change_points: those with a fit of their own, the most probable first.
-        close_to_change_point: the closest rival of the first of them.
+        records: as they are.
+        effects: causes besides the catalogue.
+        onsets: id → effect that may begin in mid-trial.
+        budget: one of BUDGETS.
+        seed: of all random numbers.
+        progress: called with the share that is done, and the present step.
     """
 
-    inside: Mapping[Ids, float]
-    outside: Mapping[Ids, float]
-    best: Candidate
-    close_to_best: ClosestRival
-    change_points: Sequence[FittedChangePoint]
-    close_to_change_point: ClosestRival
-
-    @property
-    def probabilities(self) -> dict[Ids, float]:
-        """Every explanation → probability."""
-        return {**self.inside, **self.outside}
-
-    @property
-    def change_point(self) -> ChangePointSummary:
-        """A summary of the most probable change point."""
-        if not self.change_points:
-            return ChangePointSummary()
-        first = self.change_points[0]
-        return ChangePointSummary(
-            self.outside[(first.id,)], is_large(first), self.close_to_change_point.discrimination
-        )
+    records: Sequence[Logged]
+    effects: Sequence[Effect]
+    onsets: Mapping[str, Effect]
+    budget: str
+    seed: int
+    progress: Progress
 
 
-def is_large(fitted: FittedChangePoint) -> bool:
-    """Say whether a change point is of a practical size; calibration does not change in mid-trial, so that half the
-    tolerance of calibration is enough.
-    """
-    sizes = zip(fitted.change_point.mean, fitted.change_point.effect.parameters, strict=True)
-    return any(
-        abs(float(z)) > PRACTICAL_TOLERANCES_SUDDEN * fitted.change_point.kappa * p.tolerance
-        for z, p in sizes
+def concluded(asked: Asked, outcome: Outcome, detectable: tuple[Detectability, ...]) -> Verdict:
+    """Return the verdict of a search that has ended."""
+    pool, named = pool_of(outcome), names(outcome)
+    best = best_of(pool, outcome)
+    errors = [(record, error) for record, error in best.errors if error.id in named]
+    problem = posed(without_errors(asked.records, errors), asked.effects, outcome.search.problem, best.fit)
+    reported = fitted(problem, asked.onsets, best)
+    unstable = unstable_in(problem, reported)
+    verdict, on_model = decided(outcome, best, named, is_unstable=bool(unstable))
+    report = Report(
+        on_model=on_model,
+        problem=problem,
+        pool=pool,
+        best=best,
+        fit=reported,
+        causes=tuple(each for each in best.causes if on_model == CAUSE_NAMED and each in named),
+        unknown=next((each for each in named if on_model == OUTSIDE and each.startswith((FORCE, DRIFT))), ""),
+        others=_others(asked, problem, pool, best, errors),
+    )
+    rest = follow_up(asked, report)
+    causes = tuple(cause_of(reported, each, named[each]) for each in report.causes)
+    rivals = _rivals(asked, report)
+    return Verdict(
+        verdict=verdict,
+        then=on_model if verdict == DATA_ERROR else "",
+        sentence=_sentence(on_model, causes, rest.unknown, rivals),
+        causes=causes,
+        rivals=rivals,
+        data_errors=tuple(_found_errors(asked.records, errors, named)),
+        probabilities=_listed(pool),
+        tolerance_scale=_tolerance_scale(outcome),
+        detectable=detectable,
+        misfit={
+            each.name: misfits(each, respond(each.setting, each.time, each.noise)) for each in problem.records
+        },
+        deviations=deviations(reported),
+        extended=rest.extended,
+        unknown=rest.unknown,
+        gain=rest.gain,
+        next_trial=rest.next_trial,
+        curves=rest.curves,
+        notes=(*outcome.verdict.notes, *_notes(problem, _tolerance_scale(outcome))),
+        seed=asked.seed,
+        complete=outcome.search.complete,
+        unstable=unstable,
     )
 
 
-class RemainingModels(NamedTuple):
-    """The explanations that the records allow: hypotheses, change points, latent forces and drifts with the causes
-    that they are added to; and the credible set, the smallest one that is probable enough.
+def names(outcome: Outcome) -> dict[str, float]:
+    """Return the id of each named term of the best explanation, as it is reported, → its probability."""
+    problem, best = outcome.search.problem, outcome.search.ranked()[0]
+    known = {each.id: each.probability for each in outcome.verdict.named}
+    return {id_of(problem, best, term): known[term.id] for term in best.terms if term.id in known}
+
+
+def decided(
+    outcome: Outcome, best: Explanation, named: Mapping[str, float], *, is_unstable: bool
+) -> tuple[str, str]:
+    """Return the verdict, and that on the model, on the records without errors in their data.
+
+    In a record of an unstable motion no force is named: a growing error of a simulation looks like one.
     """
-
-    hypotheses: list[Ids]
-    change_points: list[FittedChangePoint]
-    forces: list[Ids]
-    credible: list[Ids]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FollowUp:
-    """Results that need simulations after the search, made for one verdict.
-
-    Attributes:
-        verdict: it was made for.
-        remaining: the explanations that the records allow.
-        extension: the verdict's additions to the model.
-        rivals: of the reported explanation, the most probable first.
-        gain: of the extended model on held-out data.
-        next_trial: recommended next trial.
-        curves: record → curves of all models that are drawn.
-    """
-
-    verdict: str
-    remaining: RemainingModels
-    extension: Extension
-    rivals: tuple[Rival, ...]
-    gain: Gain | None
-    next_trial: NextTrial | None
-    curves: Mapping[str, Curves]
+    if not outcome.verdict.nearness.near:
+        return NOTHING_NEAR, NOTHING_NEAR
+    errors = {error.id for _, error in best.errors} & set(named)
+    if any(each in best.causes for each in named):
+        on_model = CAUSE_NAMED
+    elif any(each.startswith((FORCE, DRIFT)) for each in named):
+        on_model = UNDECIDED if is_unstable else OUTSIDE
+    elif not errors:
+        on_model = outcome.verdict.verdict
+    elif outcome.verdict.suspected:
+        on_model = UNDECIDED
+    else:
+        on_model = CALIBRATED if best.is_wide else NOTHING_WRONG
+    return (DATA_ERROR if errors else on_model), on_model
 
 
-def decided(findings: Findings, ranked: Ranked) -> str:
-    """Return the verdict that follows from probabilities, sizes and distances."""
-    forces = sum(p for ids, p in ranked.outside.items() if "@" not in ids[-1])
-    is_practical = bool(practical_of(findings, ranked.best))
-    apart = ranked.close_to_best.discrimination
-    verdict = decide(ranked.inside, forces, is_practical, apart, ranked.change_point)
-    if verdict == OUTSIDE and findings.sensitive:
-        verdict = UNDECIDED  # a growing error of a simulation looks like a force
-    entries, z, named, kappa = _explanation(findings, ranked, verdict)
-    names_something = verdict in (CAUSE_NAMED, OUTSIDE)
-    if not is_near(entries, z, named) or (names_something and kappa == max(KAPPAS)):
-        return NOTHING_NEAR
-    return qualified(verdict, findings.problem.entries, ranked.best)
+def unstable_in(problem: Problem, reported: Fitted) -> tuple[str, ...]:
+    """Return the records of an unstable motion, which no simulation follows for long."""
+    z = reported.fit.z[: len(problem.entries)]
+    finer = with_finer_steps(problem, z)
+    return tuple(run.record for run in sensitive_runs(finer, z)) if finer else ()
 
 
-def _explanation(
-    findings: Findings, ranked: Ranked, verdict: str
-) -> tuple[Sequence[Entry], np.ndarray, Ids, float]:
-    """Return the entries of the explanation that a verdict is about, their deviations (k,), the causes it names, and
-    the scale κ of the tolerances under which it is most probable.
-    """
-    best, entries = ranked.best, findings.problem.entries
-    kappa = most_probable_force(findings)[1].kappa if verdict == OUTSIDE else best.kappa
-    if verdict == CAUSE_NAMED and ranked.change_point.is_named:
-        first = ranked.change_points[0]
-        change = first.change_point
-        return first.problem.entries, first.fit.z, (change.effect.id,), change.kappa
-    added = max(findings.out_of_catalogue, key=lambda each: each.log_posterior, default=None)
-    if added and added.point and added.log_posterior > best.log_posterior:
-        return entries, added.point.fit.z, best.ids, kappa
-    return entries, best.fit.z, best.ids, kappa
+def _others(
+    asked: Asked,
+    problem: Problem,
+    pool: Sequence[Explanation],
+    best: Explanation,
+    errors: Sequence[tuple[int, DataError]],
+) -> dict[Ids, Fitted]:
+    """Return the fits of "nothing is wrong" and of the most probable other explanations, of the same records."""
+    same = [
+        each
+        for each in pool
+        if each is not best and each.is_of_catalogue and {*each.errors} == {*errors} and each.causes
+    ]
+    worth = [each for each in same if each.probability > RIVAL_PROBABILITY][:MAX_FITTED]
+    plain = next((each for each in pool if not each.causes and {*each.errors} == {*errors}), pool[0])
+    nothing = replace(plain, causes=(), fit=replace(plain.fit, terms=()))
+    return {(): fitted(problem, asked.onsets, nothing)} | {
+        each.causes: fitted(problem, asked.onsets, each) for each in worth
+    }
 
 
-def remaining_models(ranked: Ranked) -> RemainingModels:
-    """Return the explanations that the records allow, from the credible set."""
-    credible = credible_set(ranked.probabilities)
-    return RemainingModels(
-        hypotheses=[ids for ids in credible if ids in ranked.inside],
-        change_points=[point for point in ranked.change_points if (point.id,) in credible],
-        forces=[ids for ids in credible if ids and ids[-1] in OUTSIDE_SENTENCES],
-        credible=credible,
-    )
-
-
-def rivals_of(
-    findings: Findings, ranked: Ranked, verdict: str, remaining: RemainingModels, new: Extension
-) -> tuple[Rival, ...]:
+def _rivals(asked: Asked, report: Report) -> tuple[Rival, ...]:
     """Return the rivals of the reported explanation, the most probable first; where none is reported, all that
     remain.
     """
-    is_undecided, best = verdict == UNDECIDED, ranked.best
-    found = rivals(findings, best, ranked.inside, remaining.hypotheses, None if is_undecided else best.ids)
-    if new.cause:
-        found = (closest_rival(findings, ranked.inside, *ranked.close_to_change_point),)
-    late = [
-        rival_of(findings, point, ranked.outside[(point.id,)])
-        for point in remaining.change_points
-        if point.id != new.id
-    ]
-    forces = (
-        [force_rival(findings, ids, ranked.outside[ids]) for ids in remaining.forces] if is_undecided else []
-    )
-    return tuple(sorted([*found, *late, *forces], key=lambda force: -force.probability))
+    undecided = report.on_model == UNDECIDED
+    listed = [each for each in report.pool if undecided or each is not report.best]
+    worth = [each for each in listed if each.probability >= RIVAL_PROBABILITY][:MAX_RIVALS] or listed[:1]
+    return tuple(_rival(asked, report, each) for each in worth)
 
 
-def conclude(findings: Findings, ranked: Ranked, follow_up: FollowUp) -> Verdict:
-    """Return the verdict of a finished (or interrupted) search."""
-    new, best, verdict = follow_up.extension, ranked.best, follow_up.verdict
-    named = _named(findings, ranked, verdict, new)
-    left = names_of(follow_up.remaining.credible, follow_up.rivals)
-    return Verdict(
-        verdict=verdict,
-        sentence=_sentence(verdict, named, best, left, new.unknown),
-        causes=named,
-        rivals=follow_up.rivals,
-        unknown=new.unknown,
-        extended=new.extended,
-        gain=follow_up.gain,
-        next_trial=follow_up.next_trial,
-        curves=follow_up.curves,
-        probabilities=_listed(ranked.probabilities),
-        tolerance_scale=tolerance_scale(findings.search.candidates.values()),
-        detectable=findings.detectable,
-        misfit=findings.misfit,
-        deviations=deviations(findings, best),
-        notes=_notes(findings, best, sum(ranked.inside.values())),
-        seconds=findings.seconds,
-        seed=findings.seed,
-        complete=findings.complete,
-        unstable=tuple(run.record for run in findings.sensitive),
+def _rival(asked: Asked, report: Report, each: Explanation) -> Rival:
+    of = report.fit if each is report.best else report.others.get(each.causes)
+    known = of if each.is_of_catalogue and not set(each.ids) - set(each.causes) else None
+    return Rival(
+        ids=each.ids,
+        sentence=" and ".join(sentence_of(report, each, id) for id in each.ids) or "nothing is wrong",
+        probability=each.probability,
+        discrimination=between(report.fit, report.best.causes, each.causes)
+        if each is not report.best
+        else math.nan,
+        parameters={id: cause_of(known, id, 1.0).parameters for id in each.causes} if known else {},
+        extended=extended_by(known, each.causes) if known else None,
     )
 
 
-def _named(findings: Findings, ranked: Ranked, verdict: str, new: Extension) -> tuple[Cause, ...]:
-    """Return the causes that are named."""
-    if new.cause:
-        return (new.cause,)
-    best = ranked.best
-    return (
-        causes(findings, best, ranked.inside, practical_of(findings, best)) if verdict == CAUSE_NAMED else ()
-    )
+def sentence_of(report: Report, each: Explanation, id: str) -> str:
+    """Return a term of an explanation in words."""
+    if error := next((error for _, error in each.errors if error.id == id), None):
+        return error.sentence()
+    if id.startswith(FORCE):
+        return f"a {AXIS_WORDS[id.removeprefix(FORCE)]} acts that no cause explains"
+    if id.startswith(DRIFT):
+        return f"the sensor of the {id.removeprefix(DRIFT).replace('_', ' ')} drifts"
+    plain, _, time = id.partition("@")
+    sentence = next((e.effect.sentence for e in report.problem.entries if e.effect.id == plain), "")
+    sentence = sentence or next(e.sentence for e in report.problem.onsets if e.id == plain)
+    return f"from {time} s on {sentence}" if time else sentence
 
 
-def _listed(probabilities: Mapping[Ids, float]) -> dict[str, float]:
-    """Return hypothesis → probability, the most probable first."""
-    listed = sorted(probabilities.items(), key=lambda pair: -pair[1])
-    return {name(ids): p for ids, p in listed if p > LISTED_PROBABILITY}
+def _found_errors(
+    records: Sequence[Logged], errors: Sequence[tuple[int, DataError]], named: Mapping[str, float]
+) -> Iterator[FoundError]:
+    """Yield the named errors in the data, of each record that has them."""
+    for of, error in errors:
+        for k, record in enumerate(records):
+            if of in (-1, k):
+                yield FoundError(
+                    id=error.id,
+                    record=record.name,
+                    columns=error.columns,
+                    sentence=error.sentence(),
+                    remedy=error.remedy(),
+                    probability=min(named[error.id], MOST),
+                    amount=error.amount,
+                    amount_sd=error.amount_sd,
+                    since=error.since,
+                )
 
 
-def _notes(work: Findings, best: Candidate, inside: float) -> tuple[str, ...]:
-    """Return further remarks for a reader; on the tolerances, if causes that hold throughout are probable."""
-    found, scale = [], tolerance_scale(work.search.candidates.values())
-    wide = max(scale, key=lambda kappa: scale[kappa])
-    if wide > 1.0 and inside > HEALTHY_PROBABILITY:
-        found.append(
-            f"The declared tolerances look too tight: {wide:g} times as wide explains the records best."
-        )
-    if not best.fit.converged:
-        found.append(
-            "The best fit has not settled entirely; its numbers are less certain than their intervals say."
-        )
-    found += [
-        f"{run.record}: an unstable motion, which no simulation follows for long. At a vehicle that is a little "
-        f"different, steps err by {run.levels:.1f} noise levels of {run.channel} more or less. No force is named in "
-        "such a record; a shorter one of the same manoeuvre, or one that is steered less, says more."
-        for run in work.sensitive
-    ]
-    for record, channels in work.misfit.items():
-        for channel, each in channels.items():
-            ratio = each.noise_sd / SPECS[channel].noise
-            if not USUAL_NOISE_RATIO[0] < ratio < USUAL_NOISE_RATIO[1]:
-                found.append(f"{record}, {channel}: the noise is {ratio:.1f} times that of a usual sensor.")
-    return tuple(found)
+def _listed(pool: Sequence[Explanation]) -> dict[str, float]:
+    """Return explanation → probability, the most probable first, with that of what the records do not show."""
+    found = {name(each.ids): each.probability for each in pool if each.probability > LISTED_PROBABILITY}
+    rest = 1.0 - sum(each.probability for each in pool)
+    found |= {UNSEEN: rest} if rest > LISTED_PROBABILITY else {}
+    return dict(sorted(found.items(), key=lambda pair: -pair[1]))
+
+
+def _tolerance_scale(outcome: Outcome) -> dict[float, float]:
+    """Return how much wider the tolerances are than declared → probability."""
+    ranked = outcome.search.ranked()
+    wide = [any(term.kind == "tolerances" for term in each.terms) for each in ranked]
+    p = float(np.sum(outcome.probabilities, where=np.array(wide)) / np.sum(outcome.probabilities))
+    return {1.0: 1.0 - p, WIDE: p}
 
 
 def _sentence(
-    verdict: str,
-    named: tuple[Cause, ...],
-    best: Candidate,
-    left: Sequence[str],
-    unknown: Unknown | None,
+    on_model: str, causes: Sequence[Cause], unknown: Unknown | None, rivals: Sequence[Rival]
 ) -> str:
-    """Return the verdict in a sentence."""
-    if verdict == NOTHING_WRONG:
-        size = f" The fit moves {name(best.ids)}, within what calibration may." if best.ids else ""
-        return f"Nothing is wrong beyond the tolerances of the model.{size}"
-    if verdict == CALIBRATED:
-        return (
-            "No cause is named, but numbers of the model had to move beyond their tolerances: it wants calibration. "
-            "`subzero calibrate` estimates them."
+    """Return the verdict on the model in a sentence."""
+    if on_model == CAUSE_NAMED:
+        words = " and ".join(
+            (f"from {cause.start_time:g} s on " if cause.start_time is not None else "") + cause.sentence
+            for cause in causes
         )
-    if verdict == NOTHING_NEAR:
-        return (
-            "Nothing comes near: the best explanation leaves more than noise, or bends what it does not name."
-        )
-    if verdict == CAUSE_NAMED:
-        since = f"From {named[0].start_time:g} s on, " if named[0].start_time is not None else ""
-        words = since + ", and ".join(cause.sentence for cause in named)
         return f"{words[0].upper()}{words[1:]}."
-    if verdict == OUTSIDE and unknown and unknown.is_drift:
-        return f"The sensor of the {unknown.axis.replace('_', ' ')} drifts as no cause of the catalogue explains."
-    if verdict == OUTSIDE and unknown:
-        return f"Something acts on {unknown.axis} that no cause of the catalogue explains."
-    return f"These records cannot tell apart: {', '.join(left)}."
+    if on_model == OUTSIDE and unknown:
+        what = (
+            f"The sensor of the {unknown.axis.replace('_', ' ')} drifts"
+            if unknown.is_drift
+            else f"Something acts on {unknown.axis}"
+        )
+        return f"{what} as no cause of the catalogue explains."
+    if on_model == UNDECIDED:
+        return f"These records cannot tell apart: {', '.join(name(rival.ids) for rival in rivals)}."
+    return SENTENCES[on_model]
+
+
+SENTENCES = {
+    NOTHING_WRONG: "Nothing is wrong beyond the tolerances of the model.",
+    CALIBRATED: "No cause is named, but numbers of the model had to move beyond their tolerances: it wants "
+    "calibration. `subzero calibrate` estimates them.",
+    NOTHING_NEAR: "Nothing comes near: the best explanation leaves more than noise, or bends what it does not name.",
+}
+
+
+def _notes(problem: Problem, scale: Mapping[float, float]) -> Iterator[str]:
+    """Yield further remarks for a reader."""
+    if scale[WIDE] > scale[1.0]:
+        yield f"The declared tolerances look too tight: {WIDE:g} times as wide explains the records best."
+    for record in problem.records:
+        for channel, noise in record.noise.items():
+            ratio = noise.sd / SPECS[channel].noise
+            if not USUAL_NOISE_RATIO[0] < ratio < USUAL_NOISE_RATIO[1]:
+                yield f"{record.name}, {channel}: the noise is {ratio:.1f} times that of a usual sensor."

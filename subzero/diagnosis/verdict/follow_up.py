@@ -1,36 +1,28 @@
-"""The parts of a verdict that need simulations: distances to rivals, a latent force, gain, next trial, curves.
-
-A change point has its own distance to others with the same onset, with the onset free:
-
-    D = sᵀ (I + B Bᵀ)⁻¹ s,    B = [J κτ, C s_b]
-
-Rivals that may be improbable only by chance are fitted, too, where the verdict is undecided.
-"""
+"""The parts of a verdict that need more simulations: an unknown force, the gain, the next trial, curves."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from subzero.diagnosis.assessment.goodness_of_fit import Fitted, curves, gain
-from subzero.diagnosis.assessment.identifiability import (
-    against,
-    information,
-    marginal,
-    separation,
-    with_whole_effects,
+from subzero.diagnosis.assessment import Fitted, curves, gain, next_trial
+from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
+from subzero.diagnosis.hypothesis.effect import MINUTE_S, plain_id
+from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of
+from subzero.diagnosis.inference import (
+    MAX_DRIFT_LEVELS,
+    Fit,
+    Formula,
+    Problem,
+    describe,
+    estimate_drift,
+    estimate_force,
+    fit_with_drift,
+    samples_of,
 )
-from subzero.diagnosis.assessment.next_trial import Survivor, next_trial
-from subzero.diagnosis.hypothesis.effect import MINUTE_S, with_onset
-from subzero.diagnosis.hypothesis.hypotheses import Ids, columns_of, nameable
-from subzero.diagnosis.inference import settings
-from subzero.diagnosis.inference.change_point_fit import FittedChangePoint
-from subzero.diagnosis.inference.change_point_scan import BaseRun, change_point_columns
-from subzero.diagnosis.inference.model_average import MIN_DISCRIMINATION, REFUTED_NATS
-from subzero.diagnosis.inference.out_of_catalogue import Findings, shares
 from subzero.diagnosis.results import (
     CALIBRATED,
     CAUSE_NAMED,
@@ -39,277 +31,201 @@ from subzero.diagnosis.results import (
     OUTSIDE,
     UNDECIDED,
     Curves,
+    Extended,
     Gain,
     NextTrial,
-    worth_naming,
+    Unknown,
 )
-from subzero.diagnosis.verdict.conclude import (
-    ClosestRival,
-    FollowUp,
-    Ranked,
-    RemainingModels,
-    decided,
-    remaining_models,
-    rivals_of,
-)
-from subzero.diagnosis.verdict.estimates import (
-    Extension,
-    cause_of,
-    curves_outside,
-    name,
-    of_causes,
-    of_nothing,
-    of_sudden,
-    of_unknown,
-    practical_of,
-)
+from subzero.diagnosis.verdict.estimates import extended_by, name, places
+from subzero.diagnosis.verdict.pool import Explanation
+from subzero.diagnosis.verdict.terms import FORCE
 
 if TYPE_CHECKING:
-    from subzero.diagnosis.inference.map_fit import Candidate, Fit
-    from subzero.diagnosis.inference.model_search import Search
+    from subzero.diagnosis.verdict.conclude import Asked
 
-RIVALS_DRAWN = {CAUSE_NAMED: 1, OUTSIDE: 1, NOTHING_NEAR: 1, CALIBRATED: 0, NOTHING_WRONG: 0}
-"""Verdict → number of rivals that are drawn; in an undecided one all that are named."""
+RIVALS_DRAWN = {CAUSE_NAMED: 1, OUTSIDE: 1, NOTHING_NEAR: 1, CALIBRATED: 0, NOTHING_WRONG: 0, UNDECIDED: 5}
+"""Verdict → number of rivals that are drawn."""
 MAX_SURVIVORS = 4
-"""Most hypotheses that the next trial is to tell apart."""
-
-
-def ranked(findings: Findings) -> Ranked:
-    """Return all explanations by their probability, with the closest rivals of the first."""
-    inside, added = shares(findings.search, findings.out_of_catalogue)
-    candidates = findings.search.candidates
-    best = candidates[max((ids for ids in inside if ids in candidates), key=lambda ids: inside[ids])]
-    change_points = _change_points(findings)
-    return Ranked(
-        inside=inside,
-        outside=added,
-        close_to_change_point=_closest(findings, change_points[0]) if change_points else ClosestRival(),
-        best=best,
-        close_to_best=_close_to(findings, best, practical_of(findings, best)),
-        change_points=change_points,
-    )
-
-
-def follow_up(findings: Findings, known: Ranked) -> FollowUp:
-    """Return the results that the verdict on ranked explanations needs."""
-    verdict, candidates = decided(findings, known), findings.search.candidates
-    new = _extension(findings, known, verdict)
-    left = _with_closest(findings, known, verdict, remaining_models(known))
-    others = rivals_of(findings, known, verdict, left, new)
-    fitted_too = [other.ids for other in others if other.ids and other.ids in candidates]
-    rival = candidates[fitted_too[0]].fit if fitted_too else None
-    is_full = findings.budget == "full" and findings.complete
-    return FollowUp(
-        verdict=verdict,
-        remaining=left,
-        extension=new,
-        rivals=others,
-        gain=_gained(findings, new, rival) if is_full and new.is_new else None,
-        next_trial=_next_trial(findings, left, known.probabilities)
-        if is_full and verdict == UNDECIDED
-        else None,
-        curves=_curves(findings, verdict, new, known, [other.ids for other in others if other.ids]),
-    )
-
-
-def _change_points(findings: Findings) -> list[FittedChangePoint]:
-    """Return the change points that have a fit of their own, the most probable first."""
-    ordered = sorted(findings.out_of_catalogue, key=lambda candidate: -candidate.log_posterior)
-    return [candidate.what for candidate in ordered if isinstance(candidate.what, FittedChangePoint)]
-
-
-def _close_to(findings: Findings, best: Candidate, ids: Ids) -> ClosestRival:
-    """Return the closest rival of causes as they are in a candidate; none if there are no causes."""
-    if not ids:
-        return ClosestRival()
-    J = with_whole_effects(findings.problem, best.fit.J, best.fit.z)
-    D, rival = separation(findings.problem, J, best.fit.z, ids, best.kappa, findings.refuted)
-    return ClosestRival(D, () if rival == "none" else (rival,))
-
-
-def _closest(findings: Findings, fitted: FittedChangePoint) -> ClosestRival:
-    """Return the closest rival of a change point: the tolerances, a cause that holds throughout, or another with its
-    onset.
-    """
-    n, more = len(findings.problem.entries), fitted.problem
-    M, own = marginal(more, fitted.fit.J, fitted.change_point.kappa), list(range(n, len(more.entries) - 1))
-    step = fitted.fit.z[own]
-    found: dict[Ids, float] = {(): float(step @ information(more, M, own, fitted.change_point.kappa) @ step)}
-    for other in nameable(more.entries):
-        at = columns_of(more.entries, (other,))
-        found[(other,)] = against(more, M, own, step, at, fitted.change_point.kappa)[0]
-    found |= _from_its_time_on(findings, fitted)
-    rival = min(found, key=lambda ids: found[ids])
-    return ClosestRival(found[rival], rival)
-
-
-def _from_its_time_on(findings: Findings, fitted: FittedChangePoint) -> dict[Ids, float]:
-    """Return D against each other cause with the same onset: the part of the response that no tolerance and no size
-    of the other explains,
-
-    D = sᵀ (I + B Bᵀ)⁻¹ s,    B = [J κτ, C s_b]
-
-    A jam of a fin with no command lost is an offset of the fin: a cause that does the same is no rival.
-    """
-    started, fit, n = fitted.change_point, fitted.fit, len(findings.problem.entries)
-    others = [effect for effect in findings.problem.sudden_effects if effect.id != started.effect.id]
-    C = change_point_columns(
-        BaseRun(fitted.problem, fit.z), [(effect, started.time) for effect in others], started.record
-    )
-    free = [*range(n), fit.z.size - 1]
-    tolerance = np.array([started.kappa * fitted.problem.entries[k].parameter.tolerance for k in free])
-    shown, within = fit.J[:, n:-1] @ fit.z[n:-1], fit.J[:, free] * tolerance
-    found = dict[Ids, float]()
-    for effect, own in zip(others, C, strict=True):
-        scales = [0.0 if p.also_of == started.effect.id else p.scale for p in effect.parameters]
-        B = np.hstack([within, own * np.array(scales)])
-        b = B.T @ shown
-        rest = float(shown @ shown - b @ np.linalg.solve(np.eye(b.size) + B.T @ B, b))
-        found[(with_onset(effect, started.time).id,)] = max(rest, 0.0)
-    return found
-
-
-def _extension(findings: Findings, known: Ranked, verdict: str) -> Extension:
-    """Return the additions of a verdict to the model."""
-    best = known.best
-    if verdict == CAUSE_NAMED and known.change_point.is_named:
-        first = known.change_points[0]
-        return of_sudden(findings, first, cause_of(findings, first, known.change_point.probability))
-    if verdict == OUTSIDE:
-        return of_unknown(findings)
-    if verdict == CAUSE_NAMED:
-        return of_causes(findings, best, practical_of(findings, best))
-    return of_nothing(findings, best)
-
-
-def _with_closest(findings: Findings, known: Ranked, verdict: str, left: RemainingModels) -> RemainingModels:
-    """Return the remaining models; where the verdict is undecided and one explanation remains, with its closest rival
-    added, which may be improbable only by chance.
-    """
-    hypotheses, late, best = left.hypotheses, left.change_points, known.best
-    if verdict != UNDECIDED:
-        return left
-    is_same_cause = all((candidate.change_point.effect.id,) in hypotheses for candidate in late)
-    if len(hypotheses) == 1 and best.ids and is_same_cause:
-        closest = _close_to(findings, best, best.ids).ids
-        findings.search.fit(closest)
-        hypotheses = [*hypotheses, closest]
-    if len(late) == len(left.credible) == 1:
-        rival = known.close_to_change_point.ids
-        late = late + [
-            point
-            for point in known.change_points
-            if rival and "@" in rival[0] and point.change_point.effect.id == rival[0].partition("@")[0]
-        ]
-    return left._replace(hypotheses=hypotheses, change_points=late)
-
-
-def _gained(findings: Findings, new: Extension, rival: Fit | None) -> Gain:
-    """Return the gain of an extension on held-out data, compared with a refit within tolerances and the best
-    rival.
-    """
-    tolerance = Fitted(findings.problem, findings.search.candidates[()].fit)
-    other = Fitted(findings.problem, rival) if rival else None
-    nominal = findings.search.nominal[0]
-    return gain(nominal, tolerance, Fitted(new.problem, new.fit), other, seed=findings.seed)
+"""Most explanations that the next trial is to tell apart."""
+MENTIONED_PROBABILITY = 0.01
+"""Features that are less probable in a formula are not mentioned."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CalibrationFromOnset:
-    """A cause with a change point as it will be in trials to come: throughout. As a `next_trial.Survivor`."""
+class Report:
+    """What a verdict reports.
+
+    Attributes:
+        on_model: the verdict on the records without errors in their data.
+        problem: of those.
+        pool: all explanations, the most probable first.
+        best: the reported one.
+        fit: its fit.
+        causes: those that are named.
+        unknown: id of the force or drift that is named; "" for none.
+        others: causes → fit of an explanation of the same records; () is "nothing is wrong".
+    """
+
+    on_model: str
+    problem: Problem
+    pool: Sequence[Explanation]
+    best: Explanation
+    fit: Fitted
+    causes: Ids
+    unknown: str
+    others: Mapping[Ids, Fitted]
+
+    @property
+    def probabilities(self) -> dict[Ids, float]:
+        """Causes of explanations that have a fit → probability."""
+        found: dict[Ids, float] = {}
+        for each in self.pool:
+            if each.is_of_catalogue:
+                found[each.causes] = found.get(each.causes, 0.0) + each.probability
+        return found
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FollowUp:
+    """Results that need simulations after the search.
+
+    Attributes:
+        extended: the model with what is named.
+        unknown: the latent force or drift.
+        gain: of the extended model on held-out data.
+        next_trial: recommended next trial.
+        curves: record → curves of all models that are drawn.
+    """
+
+    extended: Extended
+    unknown: Unknown | None = None
+    gain: Gain | None = None
+    next_trial: NextTrial | None = None
+    curves: Mapping[str, Curves] = field(default_factory=dict)
+
+
+def follow_up(asked: Asked, report: Report) -> FollowUp:
+    """Return the results that a verdict needs."""
+    new, unknown, extended = _extension(report)
+    is_full = asked.budget == "full"
+    is_new = bool(extended.deviations or extended.missing) and not (unknown and unknown.is_drift)
+    return FollowUp(
+        extended=extended,
+        unknown=unknown,
+        gain=_gained(report, new, asked.seed) if is_full and is_new else None,
+        next_trial=_next_trial(asked, report) if is_full and report.on_model == UNDECIDED else None,
+        curves=_curves(report, new),
+    )
+
+
+def _extension(report: Report) -> tuple[Fitted, Unknown | None, Extended]:
+    """Return the fit of the model with what is named, the unknown force or drift, and the model."""
+    if report.on_model == OUTSIDE:
+        return _of_unknown(report)
+    if report.on_model == CAUSE_NAMED:
+        return report.fit, None, extended_by(report.fit, report.causes)
+    nothing = report.others[()]
+    return nothing, None, extended_by(nothing, ())
+
+
+def _of_unknown(report: Report) -> tuple[Fitted, Unknown, Extended]:
+    kind, _, which = report.unknown.partition(":")
+    problem, fit = report.fit
+    if kind + ":" == FORCE:
+        found = estimate_force(problem, fit, which)
+        unknown = with_formula(found.unknown, describe(found))
+    else:
+        found = estimate_drift(problem, fit, which, MAX_DRIFT_LEVELS * SPECS[which].noise)
+        found = replace(found, fit=fit_with_drift(problem, found, found.fit.D))
+        unknown = found.unknown
+    new = Fitted(found.problem, found.fit)
+    return new, unknown, replace(extended_by(new, report.causes), missing=found.missing)
+
+
+def with_formula(unknown: Unknown, formula: Formula) -> Unknown:
+    """Return a force with the history of its formula, if there is one: it is far closer to the true force than the
+    free history.
+    """
+    if not formula.shapes or formula.log_gain <= 0.0:
+        return unknown
+    columns = np.column_stack([shape.columns for shape in formula.shapes])
+    band = np.sqrt(np.maximum(np.sum(columns @ formula.covariance * columns, axis=1), 0.0))
+    return replace(
+        unknown,
+        time=samples_of(float(unknown.time[-1])),
+        force=formula.force(),
+        band=band,
+        formula=formula.terms(),
+        features={feature: p for feature, p in formula.features.items() if p >= MENTIONED_PROBABILITY},
+    )
+
+
+def _gained(report: Report, new: Fitted, seed: int) -> Gain:
+    """Return the gain of the extended model on held-out data, compared with a refit within tolerances and the best
+    rival.
+    """
+    nothing = report.others[()]
+    rival = next((fit for causes, fit in report.others.items() if causes and "@" not in name(causes)), None)
+    nominal = report.problem.residual(np.zeros(len(report.problem.entries)))
+    return gain(nominal, nothing, new, rival, seed=seed)
+
+
+@dataclass(frozen=True, eq=False)
+class Survivor:
+    """An explanation with its fit, as it will be in trials to come."""
 
     ids: Ids
     fit: Fit
 
 
-def _calibration_from_onset(findings: Findings, what: FittedChangePoint) -> CalibrationFromOnset | None:
-    """Return a cause with a change point as one that holds throughout, as large (or grown) as it is at the end of its
-    record, with the posterior of its size; None for a jam, which is no deviation of a fin that follows its command.
-    """
-    n, fit, effect = len(findings.problem.entries), what.fit, what.change_point.effect
-    at = columns_of(findings.problem.entries, (effect.grows or effect.id,))
-    if not at:
-        return None
-    lasts = float(findings.problem.records[what.change_point.record].time[-1]) - what.change_point.time
-    grown = lasts / MINUTE_S if effect.grows else 1.0
-    z, J, D = fit.z[:n].copy(), fit.J[:, :n].copy(), fit.D[:n].copy()
-    z[at], J[:, at], D[at] = grown * fit.z[n:-1], fit.J[:, n:-1] / grown, grown**2 * fit.D[n:-1]
-    return CalibrationFromOnset(ids=(what.id,), fit=replace(fit, z=z, J=J, D=D))
-
-
-def _survivors(findings: Findings, left: RemainingModels) -> list[Survivor]:
-    """Return the explanations that the next trial is to tell apart; a fault in mid-trial persists, so that it is the
-    same as one that holds throughout.
-    """
-    candidates = findings.search.candidates
-    found: list[Survivor] = [candidates[ids] for ids in left.hypotheses if ids in candidates]
-    broken = [
-        _calibration_from_onset(findings, point)
-        for point in left.change_points
-        if (point.change_point.effect.id,) not in left.hypotheses
-    ]
-    return found + [candidate for candidate in broken if candidate]
-
-
-def _next_trial(
-    findings: Findings, left: RemainingModels, probabilities: Mapping[Ids, float]
-) -> NextTrial | None:
+def _next_trial(asked: Asked, report: Report) -> NextTrial | None:
     """Return the trial that would best tell apart the most probable remaining explanations."""
-    survivors = sorted(_survivors(findings, left), key=lambda survivor: -probabilities.get(survivor.ids, 0.0))
-    few = survivors[:MAX_SURVIVORS]
-    findings.search.progress(
-        0.92, "the next trial, for " + ", ".join(name(candidate.ids) for candidate in few)
-    )
-    weights = [probabilities.get(candidate.ids, 0.0) for candidate in few]
-    return next_trial(findings.problem, few, probabilities=weights, seed=findings.seed)
+    known = {**report.others, **({report.best.causes: report.fit} if report.best.is_of_catalogue else {})}
+    chances = {causes: p for causes, p in report.probabilities.items() if causes in known}
+    ranked = sorted(chances, key=lambda causes: -chances[causes])
+    few = [each for causes in ranked if (each := _survivor(report.problem, causes, known[causes]))]
+    few = few[:MAX_SURVIVORS]
+    asked.progress(0.92, "the next trial, for " + ", ".join(name(each.ids) for each in few))
+    weights = [chances[each.ids] for each in few]
+    return next_trial(report.problem, few, probabilities=weights, seed=asked.seed)
 
 
-def _curves(
-    findings: Findings, verdict: str, new: Extension, known: Ranked, rivals: Sequence[Ids]
-) -> dict[str, Curves]:
-    """Return record → curves of the nominal model, of the refits, and of the rivals that are drawn, in their order:
-    causes that hold throughout, those that began in mid-trial, forces and drifts, each in the problem that it was
-    fitted in.
+def _survivor(problem: Problem, causes: Ids, of: Fitted) -> Survivor | None:
+    """Return an explanation as it will be in trials to come: a cause that began in mid-trial holds throughout, as large
+    (or grown) as it is at the end of its record, with the posterior of its size; None for a jam, which is no deviation
+    of a fin that follows its command.
     """
-    candidates = findings.search.candidates
-    late: dict[Ids, FittedChangePoint] = {(point.id,): point for point in _change_points(findings)}
-    fits: dict[str, Fit | None] = {"nominal": None, "tolerance": candidates[()].fit}
-    fits |= {"extended": new.fit} if verdict in (CAUSE_NAMED, OUTSIDE) else {}
-    added = {(*candidate.causes, candidate.id): candidate for candidate in findings.out_of_catalogue}
-    if verdict == UNDECIDED:
-        drawn = [ids for ids in worth_naming(known.probabilities) if ids]
-    else:
-        drawn = [ids for ids in rivals if ids in candidates or ids in late][: RIVALS_DRAWN[verdict]]
-    fits |= {f"rival: {name(ids)}": candidates[ids].fit for ids in drawn if ids in candidates}
-    found = curves(new.problem, fits)
-    for ids in (ids for ids in drawn if ids not in candidates and (ids in late or ids in added)):
-        label = f"rival: {name(ids)}"
-        what = late.get(ids) or added[ids].what
-        if isinstance(what, FittedChangePoint):
-            own = curves(what.problem, {label: what.fit})
-        else:
-            own = curves_outside(findings, added[ids], label)
-        found = {
-            record: replace(candidate, models={**candidate.models, **own[record].models})
-            for record, candidate in found.items()
-        }
+    n, fit = len(problem.entries), of.fit
+    z, J, D = fit.z[:n].copy(), fit.J[:, :n].copy(), fit.D[:n].copy()
+    for cause in (each for each in causes if "@" in each):
+        own = [k for k in places(of, cause) if of.problem.entries[k].parameter.name != "start_time"]
+        entry = of.problem.entries[own[0]]
+        grows = next((e.grows for e in problem.sudden_effects if e.id == plain_id(cause)), "")
+        at = columns_of(problem.entries, (grows or plain_id(cause),))
+        if not at:
+            return None
+        lasts = float(problem.records[max(entry.record, 0)].time[-1]) - float(cause.partition("@")[2])
+        grown = lasts / MINUTE_S if grows else 1.0
+        z[at], J[:, at], D[at] = grown * fit.z[own], fit.J[:, own] / grown, grown**2 * fit.D[own]
+    return Survivor(causes, replace(fit, z=z, J=J, D=D))
+
+
+def _curves(report: Report, new: Fitted) -> dict[str, Curves]:
+    """Return record → curves of the nominal model, of the refits, and of the rivals that are drawn."""
+    fits: dict[str, Fitted | None] = {"nominal": None, "tolerance": report.others[()]}
+    if report.on_model in (CAUSE_NAMED, OUTSIDE):
+        fits["extended"] = new
+    drawn = {causes: fit for causes, fit in report.others.items() if causes}
+    if report.on_model == UNDECIDED and report.best.causes and report.best.is_of_catalogue:
+        drawn = {report.best.causes: report.fit, **drawn}
+    for causes in list(drawn)[: RIVALS_DRAWN[report.on_model]]:
+        fits[f"rival: {name(causes)}"] = drawn[causes]
+    found = curves(report.problem, {"nominal": None})
+    for label, of in fits.items():
+        if of is not None:
+            own = curves(of.problem, {label: of.fit})
+            found = {
+                record: replace(each, models={**each.models, **own[record].models})
+                for record, each in found.items()
+            }
     return found
-
-
-def refuted_rivals(search: Search) -> frozenset[str]:
-    """Return the rivals of the best hypothesis that are close only in the linear problem, as simulations show.
-
-    Linearised where there is none, a play of the rudder may look like its offset, and yet explain nothing of a
-    record.
-    """
-    best, problem, found = search.best(), search.problem, set[str]()
-    J = with_whole_effects(problem, best.fit.J, best.fit.z)
-    for _ in range(settings.MAX_TRIED if best.ids else 0):
-        D, rival = separation(problem, J, best.fit.z, best.ids, best.kappa, found)
-        if rival == "none" or D >= MIN_DISCRIMINATION:
-            break
-        search.fit((rival,), best.fit)
-        if search.candidates[(rival,)].optimistic_log_posterior > best.log_posterior - REFUTED_NATS:
-            break
-        found.add(rival)
-    return frozenset(found)
