@@ -44,6 +44,8 @@ from .truth import NoRunError, agreed
 
 KINDS = ("sign", "unit", "reference", "frozen", "step", "dropout", "swapped", "late_clock", "clock_rate", "latency",
          "command_sign", "command_swap")  # fmt: skip
+OF_CLOCK = ("late_clock", "clock_rate")
+"""Kinds that affect the times of all channels."""
 PLAIN = ("healthy", "cause", "large", "begun")
 """What records without an error in their data hide."""
 CLEAR, SURE = world.CLEAR, world.SURE
@@ -192,7 +194,7 @@ def _read(
 
 
 def _is_before_noise(error: DataError) -> bool:
-    return error.is_of_clock or error.is_of_commands or error.kind == "latency"
+    return error.kind in OF_CLOCK or error.is_of_commands or error.kind == "latency"
 
 
 def _error(kind: str, dense: Logged, times: np.ndarray, rng: np.random.Generator) -> DataError:

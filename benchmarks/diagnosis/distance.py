@@ -93,7 +93,7 @@ def sudden_distance(
     """Return D of a cause that begins in mid-trial, and what comes closest: of what holds throughout, or of the other
     sudden causes, each from the best time about then.
     """
-    zero, setting = np.zeros(len(problem.entries)), problem.records[0].setting
+    setting = problem.records[0].setting
     effects = {effect.id: effect for effect in problem.sudden_effects}
     started = with_onset(effects[one], time).apply(setting, *values)
     change, D = change_by(problem, setting, started), variances(problem.entries, (), 1.0)

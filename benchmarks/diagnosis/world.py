@@ -13,7 +13,7 @@ what fits its errors best.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -26,13 +26,12 @@ from scipy.optimize import minimize
 
 import scenarios
 import subzero
-from subzero import identification
 from subzero.diagnosis.api import diagnose_trials
 from subzero.diagnosis.hypothesis.catalogue import NOISE
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import Noise, Problem, pose
-from subzero.diagnosis.vehicle_model import vehicle_model
+from subzero.diagnosis.results import Verdict
 from subzero.identification.api import UNSEEN
 from subzero.model import Model
 from subzero.records.record import Record
@@ -264,15 +263,6 @@ def likeliest_noise(errors: np.ndarray, old: Noise) -> Noise:
 
 def result_of(one: Drawn) -> dict[str, Any]:
     """Return what a record is and what the diagnosis says of it."""
-    return _result(one, _by_catalogue)
-
-
-def result_of_any_model(one: Drawn) -> dict[str, Any]:
-    """Return the same of the engine for any model, to which the tethered vehicle is one (`vehicle_model`)."""
-    return _result(one, _by_any_model)
-
-
-def _result(one: Drawn, diagnosed: Callable[[Logged, int], dict[str, Any]]) -> dict[str, Any]:
     found = {"index": one.index, "flown": one.flown, "family": one.family, "cause": one.cause}
     try:
         logged, planted, errors = made(one)
@@ -280,60 +270,27 @@ def _result(one: Drawn, diagnosed: Callable[[Logged, int], dict[str, Any]]) -> d
         D = discriminations(problem, sensitivities(problem), planted) if planted else {}
         size = {"D": {k: v for k, (v, _) in D.items()}, "rival": {k: v for k, (_, v) in D.items()}}
         start, cpu = perf_counter(), process_time()
-        said = diagnosed(logged, one.index)
+        said = _said(diagnose_trials([logged], seed=one.index, budget="verdict"))
         return found | size | said | {"seconds": perf_counter() - start, "cpu": process_time() - cpu}
     except Exception as error:
         return {**found, "error": repr(error)}
 
 
-def _by_catalogue(logged: Logged, seed: int) -> dict[str, Any]:
-    verdict = diagnose_trials([logged], seed=seed, budget="verdict")
-    first, p = next(iter(verdict.probabilities.items()))
+def _said(verdict: Verdict) -> dict[str, Any]:
+    first, p = next(pair for pair in verdict.probabilities.items() if pair[0] != UNSEEN)
     noise = {
         name: [m.noise_sd, m.noise_slow, m.noise_time, m.resolution]
         for rows in verdict.misfit.values()
         for name, m in rows.items()
     }
-    listed = dict(list(verdict.probabilities.items())[:6])
-    named = [cause.id for cause in verdict.causes]
     return {
         "verdict": verdict.verdict,
-        "named": named,
+        "named": [cause.id for cause in verdict.causes],
         "first": first,
         "p": p,
-        "listed": listed,
+        "listed": dict(list(verdict.probabilities.items())[:6]),
         "noise": noise,
     }
-
-
-CATALOGUE_ID = {"offset": "sensor_bias", "scale": "sensor_scale", "delay": "clock_offset"}
-"""Kind of an error in the data, to a model of any kind → what the catalogue calls it."""
-CAUSE_NAMED = "cause_named"
-
-
-def _by_any_model(logged: Logged, seed: int) -> dict[str, Any]:
-    model, records = vehicle_model([logged])
-    verdict = identification.diagnose(records, model)
-    listed: dict[str, float] = {}
-    for name, p in verdict.explanations.items():
-        if name == UNSEEN:
-            continue
-        known = " + ".join(map(_as_in_catalogue, name.split(" + ")))
-        listed[known] = listed.get(known, 0.0) + p
-    first, p = max(listed.items(), key=lambda pair: pair[1])
-    named = [_as_in_catalogue(each.id) for each in verdict.named]
-    errors_of_sensors = {name for name in named if name.startswith(tuple(CATALOGUE_ID.values()))}
-    kind = CAUSE_NAMED if errors_of_sensors else verdict.verdict  # they are causes in the catalogue
-    return {"verdict": kind, "named": named, "first": first, "p": p, "listed": listed}
-
-
-def _as_in_catalogue(name: str) -> str:
-    kind, colon, channel = name.partition(":")
-    if name == "nothing is wrong":
-        return "none"
-    if name == "delay:clock":
-        return CATALOGUE_ID["delay"]
-    return f"{CATALOGUE_ID.get(kind, kind)}{colon}{channel}".removesuffix("@")
 
 
 def is_right(one: Mapping[str, Any]) -> bool:
@@ -405,7 +362,6 @@ def benchmark(
     resume: bool = False,
     families: str = "",
     against: Path | None = None,
-    any_model: bool = False,
 ) -> None:
     """Diagnose records of the world and print what came of it.
 
@@ -417,11 +373,9 @@ def benchmark(
         resume: keep the results of an interrupted run, and go on behind them.
         families: only these, with commas between; all if empty.
         against: results that were kept; what is no more as it was is listed, and the exit code is 1.
-        any_model: by the engine for any model.
     """
     chosen = [one for one in drawn(seed, count) if not families or one.family in families.split(",")]
-    made_by = result_of_any_model if any_model else result_of
-    known = results_of(chosen, made_by, tell=line_of, workers=workers, path=results, resume=resume)
+    known = results_of(chosen, result_of, tell=line_of, workers=workers, path=results, resume=resume)
     print(Counter(one["error"] for one in known if "error" in one) or "", table(known), sep="\n")
     changed = differences(read(against), known) if against else []
     print(*changed, sep="\n")

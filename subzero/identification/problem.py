@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from subzero.errors import UserError
-from subzero.identification.explanation import AFFINE, CLOCK, Entry, Term, Terms, entries_of
+from subzero.identification.explanation import AFFINE, CLOCK, KNOWN, Entry, Term, Terms, entries_of
 from subzero.identification.model import Model
 from subzero.identification.noise import (
     MEDIAN_TO_SD,
@@ -39,6 +39,9 @@ FREE_TURNS = 2.0
 """So many turns readings of an angle may span besides twice the turns of the nominal model: its logger wraps it. [-]"""
 FOLLOWS = 0.25
 """Residuals of an angle that change by less between neighbours, in turns, are followed beyond half a turn. [-]"""
+SAME_JUMP, ALONE = 0.25, 4.0
+"""Steps of an angle within this share of a turn are turns of its logger; one stands alone if those beside it are so
+many times smaller. [-]"""
 MAX_KNOTS = 200
 """Most knots of one unknown input in one record: its time is lengthened where there would be more."""
 FIXED = 1e-6
@@ -202,7 +205,9 @@ class Problem:
         turn, each = self.model.channels[name].turn, self.channels[name]
         if not turn or abs(factor) == 1.0:
             return True
-        if (np.abs(np.diff(each.values[each.used])) > 0.5 * turn).any():
+        alone = jumps(each.values[each.used])
+        turns = [turn * abs(known) for known, *_ in KNOWN if are_turns(alone, turn * abs(known))]
+        if turns and not are_turns(alone, turn * abs(factor)):
             return False  # the logger wraps what it takes for an angle
         having = [(k, record) for k, record in enumerate(self.records) if name in record.columns]
         most = FREE_TURNS * turn + 2.0 * float(np.ptp(self._at_nominal(name, having)))
@@ -557,6 +562,18 @@ def _input(record: Record, name: str) -> np.ndarray:
     if not known.any():
         raise UserError(f"{record.name}: the input {name!r} has no value.")
     return np.interp(record.time, at[known], values[known])
+
+
+def jumps(values: np.ndarray) -> np.ndarray:
+    """Return the sizes of steps between readings (m,) that stand alone among the largest."""
+    steps = np.abs(np.diff(values))
+    beside = np.maximum(np.append(steps[1:], 0.0), np.append(0.0, steps[:-1]))
+    return steps[(steps > 0.5 * steps.max(initial=0.0)) & (steps > ALONE * beside)]
+
+
+def are_turns(alone: np.ndarray, turn: float) -> bool:
+    """Return whether steps that stand alone (n,) are those of an angle that is wrapped at a turn."""
+    return bool(alone.size and (np.abs(alone / turn - 1.0) < SAME_JUMP).all())
 
 
 def spikes(values: np.ndarray, far: float, turn: float) -> np.ndarray:

@@ -25,7 +25,6 @@ from subzero.diagnosis.inference import (
     columns_of,
     economical,
     entries_of,
-    freed,
     posterior,
     quadratic_step,
     respond,
@@ -73,28 +72,6 @@ def test_evidence_is_that_of_the_dense_gaussian(seed):
     covariance = np.linalg.inv(J.T @ J + np.diag(1.0 / D))
     assert_allclose(found.M, covariance, atol=1e-10)
     assert_allclose(found.z, covariance @ J.T @ y, atol=1e-10)
-
-
-@pytest.mark.parametrize("at", [[2], [0, 4]])
-def test_freeing_entries_is_another_prior(at):
-    J, D, z, r = linear_problem(7)
-    q, wide = Quadratic.at(z, r, J), D.copy()
-    wide[at] = 25.0 * D[at]
-    value, mean, covariance = freed(posterior(q, D), D, at, wide[at])
-    direct = posterior(q, wide)
-    assert_allclose(value, direct.log_evidence, atol=1e-8)
-    assert_allclose(mean, direct.z[at], atol=1e-8)
-    assert_allclose(covariance, direct.M[np.ix_(at, at)], atol=1e-8)
-
-
-def test_entries_are_freed_alike_by_themselves_and_many_at_once():
-    """Screening frees all pairs in one go; the solves are the same, so only rounding may differ."""
-    J, D, z, r = linear_problem(7)
-    base, pairs = posterior(Quadratic.at(z, r, J), D), np.array([[0, 4], [2, 3], [1, 0]])
-    together = freed(base, D, pairs, 25.0 * D[pairs])
-    for i, pair in enumerate(pairs):
-        for many, own in zip(together, freed(base, D, pair, 25.0 * D[pair]), strict=True):
-            assert_allclose(many[i], own, atol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(20))

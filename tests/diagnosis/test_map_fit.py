@@ -1,7 +1,6 @@
-"""One fit: it goes on beside non-smooth points, comes out of local minima, and keeps its Jacobian true along a step.
+"""One fit: it goes on beside non-smooth points, and keeps its Jacobian true along a step.
 
-Configuration: residuals made by hand, whose minima are known, and 8 s of fig6 with a fit that a heavy drum holds in a
-local minimum. Tolerance: the closed form; on fig6 any gain.
+Configuration: residuals made by hand, whose minima are known. Tolerance: the closed form.
 """
 
 from types import SimpleNamespace
@@ -11,18 +10,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from subzero.diagnosis.inference import (
-    Fit,
-    at_bad_minimum,
     broyden_update,
-    columns_of,
     refit,
-    restarted_where_smooth,
-    variances,
 )
-
-DRUM = ("drum_inertia",)
-DRUM_TOLERANCE = 0.2
-"""What a drum may weigh more. [kg]"""
 
 
 def test_an_update_explains_the_step_and_leaves_other_directions():
@@ -50,39 +40,3 @@ def test_a_fit_goes_on_beside_a_non_smooth_point(low):
     assert fit.z[0] == pytest.approx(1.5 if low == 0.0 else 0.0)
     assert fit.converged is (low == 0.0)
     assert fit.z[1] == 0.1
-
-
-def test_a_fit_at_a_non_smooth_point_comes_out_of_its_local_minimum():
-    """The residual is 1 at a resting drum, 2 behind it and 0 at the truth: no slope leads there from rest."""
-    columns_of, residuals = [0.0, 0.2, 0.8, 2.0], [1.0, 2.0, 0.0, 1.2]
-
-    def residual(z):
-        return np.interp(z, columns_of, residuals)
-
-    entry = SimpleNamespace(record=-1, effect=SimpleNamespace(slot="drum", id="drum_friction"),
-                            parameter=SimpleNamespace(low=0.0, high=2.0, tolerance=1.0))  # fmt: skip
-    problem = SimpleNamespace(entries=[entry], residual=residual,
-                              jacobian=lambda z: (residual(z) - residual(z + 1e-6))[:, None] / 1e-6)  # fmt: skip
-    z = np.zeros(1)
-    fit = refit(problem, z, problem.jacobian(z), np.ones(1))
-    assert fit.z == 0.0
-    again = restarted_where_smooth(problem, fit, ())
-    assert 0.6 < again.z[0] <= 0.8
-    assert again.objective < 0.4 < fit.objective
-
-
-def held_by_a_drum(problem):
-    """Return a fit of "nothing is wrong" that a heavy drum holds in a local minimum."""
-    z = np.zeros(len(problem.entries))
-    z[columns_of(problem.entries, DRUM)] = 5.0 * DRUM_TOLERANCE
-    r, J, D = problem.residual(z), problem.jacobian(z), variances(problem.entries, (), 4.0)
-    objective = 0.5 * float(r @ r + np.sum(z * z / D))
-    return Fit(z=z, r=r, J=J, D=D, objective=objective, converged=False, predicted_gain=0.0, fresh=0)
-
-
-def test_a_fit_in_a_local_minimum_is_restarted_from_a_usual_drum(plant):
-    problem = plant(duration=8.0).problem
-    fit, D = held_by_a_drum(problem), variances(problem.entries, (), 1.0)
-    again = restarted_where_smooth(problem, fit, (), D)
-    assert again.objective < fit.objective
-    assert not at_bad_minimum(problem, again, ())

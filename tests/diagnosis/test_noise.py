@@ -11,33 +11,19 @@ import dataclasses
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.linalg import block_diag
 
 import subzero
 from benchmarks.diagnosis import world
-from subzero.diagnosis import SPECS
-from subzero.diagnosis.inference import (
+from subzero.diagnosis.hypothesis.noise import (
     CorrelationTimes,
-    Linear,
-    Noise,
-    Observed,
-    Problem,
-    ResidualNoise,
     SensorPrior,
     correlation_times_of,
-    estimate,
-    gain_of_refitted_noise,
-    log_evidence_of,
-    log_marginal,
-    log_odds_of_frozen,
-    log_of_outlier,
-    log_of_outliers,
     log_prior_of,
-    refit_noise,
     resolution_of,
     spikes,
-    steps_of,
 )
+from subzero.diagnosis.hypothesis.noise_estimate import ResidualNoise, estimate, log_marginal
+from subzero.diagnosis.inference import Noise, Observed
 
 LEVEL = 0.3
 RECORDS = 24
@@ -164,60 +150,6 @@ def test_no_noise_close_by_is_more_probable_than_what_is_found():
             assert log_posterior(other) < log_posterior(found) + 0.02, (what, factor)
 
 
-def two_channels(seed):
-    """Return a problem of two channels of usual sensors, its linear problem, and prior variances: one channel says what
-    the only parameter is, the other wanders by 1.5 levels as that parameter would move it.
-    """
-    random, time = np.random.default_rng(seed), np.arange(0.0, 30.0, 0.1)
-    level = {"depth": SPECS["depth"].noise, "heading": SPECS["heading"].noise}
-    noise = {
-        name: Noise(white=sd, slow=0.2 * sd, used=np.ones(time.size, bool), time=time)
-        for name, sd in level.items()
-    }
-    J = {name: sd * np.sin(time / 4.0) for name, sd in level.items()}
-    J["heading"] *= 30.0
-    values = {name: sd * random.standard_normal(time.size) for name, sd in level.items()}
-    values["depth"] += 1.5 * J["depth"]
-    record = Observed(name="one", time=time, values=values, noise=noise, setting=None)
-    white = {name: (one.whiten(values[name]), one.whiten(J[name])) for name, one in noise.items()}
-    whole, slopes = (np.concatenate([pair[i] for pair in white.values()]) for i in range(2))
-    return Problem(records=(record,), entries=()), Linear(whole, slopes[:, None]), np.ones(1), values, J
-
-
-@pytest.mark.long
-def test_what_parameters_cannot_do_as_another_channel_says_is_noise_of_a_channel():
-    problem, linear, D, values, J = two_channels(5)
-    depth = refit_noise(problem, linear, D).records[0].noise["depth"]
-    spec = SPECS["depth"].noise
-    alone = estimate(
-        depth.time,
-        ResidualNoise(residual=values["depth"], J=J["depth"][:, None], D=D),
-        SensorPrior(spec, 0.0, False),
-    )
-    assert alone.slow < 0.5 * spec, "behind its own parameter there is no wander"
-    assert 0.7 * spec < depth.slow < 2.0 * spec, "a sine of 1.5 levels has 1.06 in the mean"
-
-
-def test_the_gain_of_own_noise_is_that_of_dense_covariances():
-    problem, linear, D, values, J = two_channels(6)
-    both, moved = np.concatenate(list(values.values())), np.concatenate(list(J.values()))
-
-    def log_posterior(one):
-        noise = one.records[0].noise
-        covariance = np.outer(moved, moved) * D[0]
-        for i, each in enumerate(noise.values()):
-            own = slice(i * each.count, (i + 1) * each.count)
-            covariance[own, own] += dense(each)
-        return log_normal(both, covariance) + sum(
-            log_prior(each, SPECS[name].noise) for name, each in noise.items()
-        )
-
-    found = refit_noise(problem, linear, D)
-    gain = log_posterior(found) - log_posterior(problem)
-    assert gain > 1.0
-    assert_allclose(gain_of_refitted_noise(problem, linear, D), gain, rtol=1e-6)
-
-
 def test_noise_that_is_looked_for_again_is_not_lost():
     """The search begins at what is known, too: it ended 5 nats beside this one, and 12 beside that of a rudder that was
     off, which a rival had.
@@ -284,41 +216,6 @@ def test_what_is_known_of_a_time_is_a_normal_distribution_whose_variance_is_not_
     for one, beside in zip(made, density, strict=True):
         normal = np.exp(-(np.log(one.correlation_time) ** 2) / (2.0 * 1.5**2)) / 1.5
         assert log_prior_of(one, usual) - log_prior_of(one, alone) == pytest.approx(np.log(beside / normal))
-
-
-def test_the_density_of_outliers_is_that_of_any_share_of_them():
-    """By quadrature over the share ε, which is one of a hundred on average beforehand."""
-    share = (np.arange(200_000) + 0.5) / 200_000
-    before = 99.0 * (1.0 - share) ** 98
-    for count, measured in ((0, 400), (4, 400), (40, 400)):
-        whole = np.mean(before * share**count * (1.0 - share) ** (measured - count))
-        density = 1.0 / (50.0 * LEVEL)
-        assert log_of_outliers(count, measured, LEVEL) == pytest.approx(
-            np.log(whole) + count * np.log(density)
-        )
-        more = np.mean(before * share ** (count + 1) * (1.0 - share) ** (measured - count)) / whole
-        assert log_of_outlier(count, measured, LEVEL) == pytest.approx(np.log(more * density), rel=1e-4)
-
-
-def test_the_evidence_of_some_samples_is_that_of_a_record_without_the_others():
-    """By dense covariances of what is kept, with the noise that is most probable beside that."""
-    problem, linear, D, values, J = two_channels(7)
-    (record,) = problem.records
-    kept = {"depth": record.time > 4.0, "heading": record.time < 20.0}
-    noise = {name: dataclasses.replace(one, used=kept[name], time=record.time[kept[name]])
-             for name, one in record.noise.items()}  # fmt: skip
-    fewer = dataclasses.replace(problem, records=(dataclasses.replace(record, noise=noise),))
-    white = [(one.whiten(values[name]), one.whiten(J[name])) for name, one in noise.items()]
-    whole, slopes = (np.concatenate([pair[i] for pair in white]) for i in range(2))
-    own = refit_noise(fewer, Linear(whole, slopes[:, None]), D).records[0].noise
-    both, moved = (np.concatenate([one[name][kept[name]] for name in own]) for one in (values, J))
-    covariance = np.outer(moved, moved) * D[0]
-    covariance += block_diag(*(dense(one) for one in own.values()))
-    prior = sum(log_prior(one, SPECS[name].noise) for name, one in own.items())
-    expected = log_normal(both, covariance) + prior
-    assert log_evidence_of(problem, linear, D, [kept]) == pytest.approx(
-        expected, abs=0.1
-    )  # of a search for noise
 
 
 A_LAG_BY_CHANCE = pytest.mark.xfail(
@@ -429,30 +326,6 @@ def test_two_spikes_at_the_end_of_a_record_are_no_majority():
         assert np.flatnonzero(spikes(spoilt, 0.02)).tolist() == sorted({first % 200, second % 200})
     slope = values + 0.01 * np.arange(200)
     assert not spikes(slope, 0.02).any(), "a slope of half a noise level a sample is none at the ends either"
-
-
-@pytest.mark.parametrize("white, slow", [(0.5, 0.0), (1.0, 0.0), (0.5, 0.7), (0.2, 1.5)])
-def test_a_rounded_channel_that_stands_still_is_not_said_to_be_frozen(white, slow):
-    """Where nothing froze, odds above e^5, which are the least to suspect it, come at most once in 150 records."""
-    usual, rng = SensorPrior(level=0.2, resolution=0.5, is_known=False), np.random.default_rng(20263)
-    for _ in range(8):
-        shown, _ = standing(usual, white, slow, rng)
-        repeats = np.arange(200) > np.flatnonzero(np.diff(shown, prepend=np.nan) != 0.0)[-1]
-        if repeats.any():
-            assert log_odds_of_frozen(steps_of(0.1 * np.arange(200), shown, usual), repeats) < 5.0
-
-
-def test_a_rounded_channel_that_flickers_no_more_is_frozen_and_slow_noise_says_less_of_it():
-    """The last 100 of 200 samples are equal, a quarter of a noise level from the edge of their step: white noise would
-    have left it some 40 times, and a slow part that lasts for 2 s may have stayed away from it.
-    """
-    usual, at, odds = SensorPrior(level=0.2, resolution=0.5, is_known=False), np.arange(200), []
-    for white, slow in ((1.0, 0.0), (0.5, 0.7)):
-        shown, true = standing(usual, white, slow, np.random.default_rng(20264), place=0.2)
-        shown[100:] = shown[100]
-        odds.append(log_odds_of_frozen(steps_of(0.1 * at, shown - true, usual), at > 100))
-    assert odds[0] > 10.0
-    assert odds[0] > odds[1] + 5.0
 
 
 def standing(

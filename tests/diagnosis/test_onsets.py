@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,14 +12,7 @@ import subzero
 from subzero import diagnose
 from subzero.diagnosis import SPECS, Setting, all_effects, with_onset
 from subzero.diagnosis.inference import (
-    BaseRun,
-    change_point_columns,
-    grown,
-    pose,
     respond,
-    spacing_of,
-    special_cases_folded,
-    times_of,
 )
 from subzero.model import Model
 from subzero.synthetic.reference_run import simulate_reference
@@ -83,82 +75,6 @@ def test_growth_is_beside_what_else_begins_in_mid_trial(setting):
         assert last.axial_drag.drag_coefficient == pytest.approx(drag * (1.0 + 24.5 / 60.0), rel=0.02)
         at_eight = [model for time, model in both.later if time <= 8.0][-1]
         assert at_eight.vehicle.rudder_servo.offset == 0.0
-
-
-def nominal_problem(scenario: str):
-    """Return the problem of a record without noise, of the nominal model."""
-    flown = subzero.load_scenario(scenario)
-    nominal = Setting(trial=flown, model=Model.of(flown))
-    times = np.arange(0.0, flown.duration + 1e-9, 0.2)
-    record = subzero.Record(source="nominal", time=times, values=respond(nominal, times, CHANNELS))
-    return pose([subzero.Logged(record=record, setting=nominal, name=scenario)])
-
-
-def test_what_an_onset_changes_is_known_along_a_run_that_the_noise_hides():
-    """Along a hull drag of half a tolerance more, no run is made but that one; along 30 tolerances, all are. Both are
-    the same to a twentieth: so far sensitivities by differences err anyway.
-    """
-    problem = nominal_problem("fig6")
-    drag = next(k for k, entry in enumerate(problem.entries) if entry.effect.id == "hull_drag")
-    offset, tolerance = all_effects()["rudder_offset"], problem.entries[drag].parameter.tolerance
-    z = np.zeros(len(problem.entries))
-    (plain,) = change_point_columns(BaseRun(problem, z), [(offset, 12.0)])
-    asked, near, far = problem.kept.asked, z.copy(), z.copy()
-    near[drag], far[drag] = 0.5 * tolerance, 30.0 * tolerance
-    (known,) = change_point_columns(BaseRun(problem, near), [(offset, 12.0)])
-    assert np.array_equal(known, plain)
-    assert problem.kept.asked == asked + 1
-    (made,) = change_point_columns(BaseRun(problem, far), [(offset, 12.0)])
-    assert not np.allclose(made, plain, rtol=0.05)
-    fresh = nominal_problem("fig6")
-    (own,) = change_point_columns(BaseRun(fresh, near), [(offset, 12.0)])
-    assert np.linalg.norm(own - plain) < 0.05 * np.linalg.norm(own)
-
-
-def test_a_linear_look_takes_rougher_steps_where_they_show_the_same(monkeypatch):
-    """A rudder that is off from 12 s on: within 3 %, as most sensitivities in rougher steps. If the runs were held to a
-    millionth of the noise, steps would stay as they are.
-    """
-    problem, offset = nominal_problem("fig6"), all_effects()["rudder_offset"]
-    z = np.zeros(len(problem.entries))
-    rough = problem.roughly(z)
-    assert rough.records[0].setting.trial.segment_length > problem.records[0].setting.trial.segment_length
-    (fine,), (found,) = (change_point_columns(BaseRun(one, z), [(offset, 12.0)]) for one in (problem, rough))
-    assert 0.0 < np.linalg.norm(found - fine) < 0.03 * np.linalg.norm(fine)
-    monkeypatch.setattr("subzero.diagnosis.inference.problem.ROUGH_LEVELS", 1e-6)
-    assert problem.roughly(z) is problem
-
-
-def test_what_grows_is_a_sum_of_steps_in_the_scan():
-    """Against runs that grow: the trapezoidal rule errs by a tenth at most well before the end; it needs no run."""
-    flown, problem = subzero.load_scenario("zigzag"), nominal_problem("zigzag")
-    along, spacing = BaseRun(problem, np.zeros(len(problem.entries))), spacing_of(problem, 0)
-    thrust, fading = all_effects()["propeller_thrust_gain"], all_effects()["fading_thrust"]
-    steps = [(thrust, time) for time in times_of(problem, 0)]
-    columns = dict(zip(steps, change_point_columns(along, steps), strict=True))
-    sums = grown([fading], columns, spacing)
-    early = [started for started in sums if started[1] < 0.6 * flown.duration]
-    assert len(early) > 5
-    for started, runs in zip(early, change_point_columns(along, early), strict=True):
-        assert np.linalg.norm(sums[started] - runs) < 0.1 * np.linalg.norm(runs)
-
-
-def fitted_change_point(name, log_posterior):
-    """A change point with nothing but what folding looks at."""
-    point = SimpleNamespace(effect=all_effects()[name], record=0)
-    return SimpleNamespace(change_point=point, log_posterior=log_posterior)
-
-
-@pytest.mark.parametrize(
-    "ahead, reported", [(0.0, ["rudder_offset"]), (1.0, ["rudder_offset"]), (5.0, ["rudder_jam"])]
-)
-def test_a_jam_that_is_not_needed_is_told_as_the_offset(ahead, reported):
-    """Four times as probable (1.4 nats) is what it needs; the offset has the probability of both then."""
-    both = [fitted_change_point("rudder_offset", -3.0), fitted_change_point("rudder_jam", ahead - 3.0)]
-    kept = special_cases_folded(both)
-    assert [one.change_point.effect.id for one, _ in kept][-1:] == reported
-    total = np.logaddexp(-3.0, ahead - 3.0)
-    assert kept[0][1] == pytest.approx(total if reported == ["rudder_offset"] else -3.0)
 
 
 @pytest.mark.parametrize(

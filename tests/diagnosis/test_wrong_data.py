@@ -16,7 +16,8 @@ from benchmarks.diagnosis import data_errors, world
 from benchmarks.diagnosis.world import ROUNDED
 from subzero import Logged
 from subzero.diagnosis import Setting, catalogue
-from subzero.diagnosis.inference import DataError, pose, repeated_values
+from subzero.diagnosis.hypothesis.data_error import DataError
+from subzero.diagnosis.inference import pose
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record
 
@@ -43,28 +44,6 @@ def test_zeros_of_a_heading_that_is_about_zero_are_one_error():
     assert found.id == "dropout:heading=0"
 
 
-@pytest.mark.parametrize("runs", [(3, 3, 4), (7, 4, 3), (2, 1, 2)])
-def test_zeros_in_short_runs_of_a_roll_angle_at_1_hz_are_one_error(runs):
-    """No run is long and no zero far from what is measured; but no other value comes twice, and zero five times."""
-    random = np.random.default_rng(20262)
-    values, at = random.normal(-0.5, 0.6, 60), 10
-    for length in runs:
-        values[at : at + length], at = 0.0, at + length + 6
-    logged = measured("dive", 20263)
-    record = Record(source="made", time=np.arange(60.0), values={"roll_angle": values})
-    (found,) = repeated_values(dataclasses.replace(logged, record=record))
-    assert (found.id, len(found.at)) == ("dropout:roll_angle=0", sum(runs))
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_values_that_come_again_by_chance_are_measured(seed):
-    """600 samples in steps of 0.001 over a range of 3: a third of the values comes twice, some four times."""
-    values = np.round(np.random.default_rng(seed).normal(0.0, 0.6, 600), 3)
-    logged = measured("dive", 20263)
-    record = Record(source="made", time=np.arange(600.0), values={"roll_angle": values})
-    assert not repeated_values(dataclasses.replace(logged, record=record))
-
-
 def test_a_rounded_depth_that_jumps_by_less_than_its_step_is_named():
     """By 0.06 m, in steps of 0.1 m: all values lie beside the multiples of before, which no motion does."""
     clean = measured("zigzag", 20264)
@@ -77,17 +56,6 @@ def test_a_rounded_depth_that_jumps_by_less_than_its_step_is_named():
     (found,) = verdict.data_errors
     assert (verdict.verdict, found.id) == ("data_error", "step:depth")
     assert (found.amount, found.since) == (pytest.approx(0.06, abs=0.0015), pytest.approx(8.0, abs=0.11))
-
-
-def test_a_rounded_heading_that_is_hardly_ever_left_is_no_drop_out_between_its_outliers():
-    clean = measured("dive", 20265)
-    heading = np.where(
-        np.arange(clean.record.time.size) < 16, np.arange(clean.record.time.size) // 2 % 2 - 1.0, 0.0
-    )
-    heading[[20, 26, 40, 60, 80, 100, 125, 131]] = 9.0
-    record = dataclasses.replace(clean.record, values={**clean.record.values, "heading": heading})
-    found = repeated_values(dataclasses.replace(clean, record=record))
-    assert not [one for one in found if one.channels == ("heading",) and one.how]
 
 
 @pytest.mark.parametrize(

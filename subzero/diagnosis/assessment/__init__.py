@@ -35,7 +35,6 @@ from subzero.diagnosis.assessment.next_trial import (
     is_safe,
     next_trial,
     outlook,
-    outlooks,
     prepared_trial,
 )
 from subzero.diagnosis.assessment.trial_library import (
@@ -71,7 +70,6 @@ __all__ = [
     "misfits",
     "next_trial",
     "outlook",
-    "outlooks",
     "parts_of",
     "prepared_trial",
     "raw",

@@ -236,18 +236,6 @@ def next_trial(
     return None if best is None else _reported(best, _weights(probabilities, len(held)), seed)
 
 
-def outlooks(problem: Problem, survivors: Sequence[Survivor]) -> list[tuple[str, Outlook]]:
-    """Return the prediction for every safe trial of the library."""
-    held, setting = beliefs(problem, survivors), problem.records[0].setting
-    coming = {name: prepared_trial(problem, make(setting)) for name, (_, make) in LIBRARY.items()}
-    shown = {name: _shown(each, held) for name, each in coming.items()}
-    return [
-        (name, outlook(h, coming[name].jacobian(held[0].z), held))
-        for name, h in shown.items()
-        if h is not None
-    ]
-
-
 def _most(plans: Sequence[Plan]) -> float:
     """Return the largest D of plans."""
     return max((plan.discrimination for plan in plans), default=0.0)

@@ -100,19 +100,9 @@ class DataError:
         return f"{self.kind}{where}{f'={self.how}' if self.how else ''}"
 
     @property
-    def numbers(self) -> int:
-        """How many of its numbers are fitted to a record: its size, and its onset."""
-        return 2 if self.kind == "step" else int(self.amount != 0.0)
-
-    @property
     def is_of_commands(self) -> bool:
         """It is an error of the commands, not of the measurements."""
         return self.kind in ("command_sign", "command_swap", "command_unit")
-
-    @property
-    def is_of_clock(self) -> bool:
-        """It affects the times of all channels."""
-        return self.kind in ("late_clock", "clock_rate")
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -125,11 +115,6 @@ class DataError:
     def factor(self) -> float:
         """How many of the unit in the column make one of the right unit."""
         return MISTAKEN[BY_NAME[self.channels[0]].unit][self.how]
-
-    @property
-    def log_jacobian(self) -> float:
-        """log|dT/dy| of a sample, T the correction."""
-        return -float(np.log(self.factor)) if self.kind == "unit" else 0.0
 
     def corrected(self, logged: Logged) -> Logged:
         """Return a record, with its trial, without this error."""
@@ -534,28 +519,13 @@ KINDS: Mapping[str, Kind] = {
 }
 """Kind → its definition."""
 
-REPEATED = ("frozen", "dropout")
-"""Kinds that are read off a record as it was written."""
+
+CORRECTED_FIRST = {"swapped": 0, "frozen": 1, "dropout": 1}
+"""Kind → its turn among corrections, before all others."""
 
 
 def corrected(logged: Logged, errors: tuple[DataError, ...]) -> Logged:
-    """Return a record without some errors, corrected in turn; those at the times that were written first."""
-    for error in sorted(errors, key=lambda each: each.kind not in REPEATED):
+    """Return a record without some errors, corrected in turn: columns and times as they were written first."""
+    for error in sorted(errors, key=lambda each: CORRECTED_FIRST.get(each.kind, len(CORRECTED_FIRST))):
         logged = error.corrected(logged)
     return logged
-
-
-SHIFTS = ("late_clock", "clock_rate", "latency")
-"""Kinds that put samples outside the trial."""
-NUMBERED = (*SHIFTS, "step")
-"""Kinds with a number that is estimated."""
-
-
-def places(logged: Logged, errors: Iterable[DataError]) -> dict[str, np.ndarray]:
-    """Return channel → index of the written sample at each place without some errors (n,); NaN where there is none,
-    as a clock puts it outside the trial, or it is no measurement.
-    """
-    count = np.arange(logged.record.time.size, dtype=float)
-    written = dataclasses.replace(logged.record, values=dict.fromkeys(logged.record.values, count))
-    moved = tuple(error for error in errors if error.kind in (*SHIFTS, *REPEATED))
-    return dict(corrected(dataclasses.replace(logged, record=written), moved).record.values)

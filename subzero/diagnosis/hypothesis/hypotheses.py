@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -141,15 +140,10 @@ def _same(setting: Setting, other: Setting) -> bool:
 Ids = tuple[str, ...]
 """The causes of a hypothesis, in alphabetical order; () is "nothing is wrong"."""
 
-_ODDS = {"none": 0.50, "single": 0.40, "pair": 0.06, "unknown": 0.04, "sudden": 0.04, "more": 0.004}
-PRIOR = {kind: odds / sum(_ODDS.values()) for kind, odds in _ODDS.items()}
-"""Probability of each kind, shared by all hypotheses of the kind; they sum to one."""
 PRACTICAL_TOLERANCES, PRACTICAL_TOLERANCES_SUDDEN = 4.0, 2.0
 """A deviation within so many tolerances is calibration, and no cause; calibration does not change in mid-trial, so
 that half of it is a cause there. [κτ]
 """
-MAX_CAUSES = 3
-"""Most causes of a hypothesis; the prior "more" is for this number."""
 
 
 def nameable(entries: Sequence[Entry]) -> list[str]:
@@ -161,22 +155,6 @@ def nameable(entries: Sequence[Entry]) -> list[str]:
 def columns_of(entries: Sequence[Entry], ids: Ids) -> list[int]:
     """Return the places of the parameters of causes in z."""
     return [k for k, entry in enumerate(entries) if entry.record < 0 and entry.effect.id in ids]
-
-
-def pairs_of(entries: Sequence[Entry], ids: Sequence[str]) -> list[Ids]:
-    """Return all pairs of different causes."""
-    return [tuple(sorted(pair)) for pair in combinations(ids, 2)]
-
-
-def log_prior(ids: Ids, count: int) -> float:
-    """Return the log prior of a hypothesis, given `count` causes that can be named."""
-    if not ids:
-        return float(np.log(PRIOR["none"]))
-    if len(ids) == 1:
-        return float(np.log(PRIOR["single"] / count))
-    if len(ids) == 2:
-        return float(np.log(PRIOR["pair"] / (count * (count - 1) / 2)))
-    return float(np.log(PRIOR["more"] / (count * (count - 1) * (count - 2) / 6)))
 
 
 def variances(entries: Sequence[Entry], ids: Ids, kappa: float) -> np.ndarray:

@@ -23,7 +23,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import betaln, gammaln
+from scipy.special import gammaln
 
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
 from subzero.identification.noise import gains as gains_of
@@ -147,36 +147,6 @@ def innovations_of_each(
             new = values[i] - expected
             white[i] = new / scale[i]
             expected = kept[i] * (expected + gain[i] * new)
-
-
-class Between(NamedTuple):
-    """Places of samples between rows of a grid: the row before each, and the share of the way to the next (n,)."""
-
-    low: np.ndarray
-    share: np.ndarray
-
-
-@compiled
-def innovations_between(
-    rows: np.ndarray,
-    places: Between,
-    kept: np.ndarray,
-    gain: np.ndarray,
-    scale: np.ndarray,
-    white: np.ndarray,
-    expected: np.ndarray,
-) -> None:
-    """Fill the `innovations` of rows of a grid (g, k), interpolated linearly at the places of samples: (n, k); given
-    `Noise.filter`, and a work space (k,).
-    """
-    expected[:] = 0.0
-    for i in range(kept.size):
-        low, share = places.low[i], places.share[i]
-        # Interpolated and filtered in one pass: the interpolated columns are never stored.
-        for j in range(rows.shape[1]):
-            new = (1.0 - share) * rows[low, j] + share * rows[low + 1, j] - expected[j]
-            white[i, j] = new / scale[i]
-            expected[j] = kept[i] * (expected[j] + gain[i] * new)
 
 
 @compiled
@@ -371,11 +341,6 @@ def slow_usual(usual: SensorPrior) -> float:
     return SLOW_SHARE * usual.level + usual.resolution / np.sqrt(12.0)
 
 
-def log_prior_of(noise: Noise, usual: SensorPrior) -> float:
-    """Return the log prior density of a noise, up to a constant that all noises share."""
-    return log_density(np.log([noise.white, noise.slow, noise.correlation_time]), prior_of(usual))
-
-
 def correlation_times_of(noise: Mapping[str, Noise]) -> dict[str, CorrelationTimes]:
     """Return the distribution of the other channels' correlation times for each channel; channels for which too few
     others have a slow part are left out.
@@ -455,27 +420,6 @@ OUTLIERS_BEFORE, OUTLIER_LEVELS = (1.0, 99.0), 50.0
 sensor with heavy tails may have ten times as many; width of the uniform distribution of an outlier, in usual levels.
 [-]
 """
-
-
-def log_of_outliers(count: int, measured: int, level: float) -> float:
-    """Return the log probability that these of some samples are outliers, plus the log density of their values; their
-    share ε ~ Beta of `OUTLIERS_BEFORE` is marginalised over.
-
-    Args:
-        count: how many are outliers.
-        measured: how many samples are measured, with the outliers.
-        level: usual one of the sensor, in the channel's unit.
-    """
-    a, b = OUTLIERS_BEFORE
-    # No binomial coefficient: these samples are the outliers, not any others.
-    which = betaln(a + count, b + measured - count) - betaln(a, b)
-    return float(which) - count * float(np.log(OUTLIER_LEVELS * level))
-
-
-def log_of_outlier(count: int, measured: int, level: float) -> float:
-    """Return the log density of one further outlier, given those."""
-    a, b = OUTLIERS_BEFORE
-    return float(np.log((a + count) / (a + b + measured) / (OUTLIER_LEVELS * level)))
 
 
 NORMAL_MIDDLE, TAIL, NORMAL_TAIL = 0.6745, 0.85, 1.4395

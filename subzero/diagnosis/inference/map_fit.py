@@ -18,8 +18,6 @@ from subzero.diagnosis.inference.linear_gaussian import Quadratic
 if TYPE_CHECKING:
     from subzero.diagnosis.inference.problem import Problem
 
-POOR_FIT_SIGMAS = 2.0
-"""A fit is poor if its sum of squares is this many standard deviations above that of noise."""
 MAX_STEPS = 8
 """Most steps of a fit."""
 NEGLIGIBLE_GAIN_NATS, CONVERGED_GAIN_NATS = 0.1, 0.5
@@ -180,12 +178,6 @@ class Fit:
             return np.inf
         tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
         return float(np.max(np.abs(self.z - self.made_at) / tolerance))
-
-
-def is_poor_fit(fit: Fit) -> bool:
-    """Say whether a fit leaves more than noise."""
-    count = fit.r.size
-    return bool(fit.r @ fit.r > count + POOR_FIT_SIGMAS * np.sqrt(2.0 * count))
 
 
 EXCESS_SIGMAS = 6.0

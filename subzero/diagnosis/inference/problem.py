@@ -12,7 +12,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from os import cpu_count
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -31,7 +31,7 @@ from subzero.diagnosis.inference.simulator import (
 
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.configuration import Setting
-    from subzero.diagnosis.hypothesis.effect import Effect, Parameter
+    from subzero.diagnosis.hypothesis.effect import Effect
 
 JACOBIAN_STEP = 0.2
 """Step of a sensitivity, in tolerances; a whole tolerance from a state of rest (a play, a friction), where slopes
@@ -321,63 +321,3 @@ class Problem:
 
 Progress = Callable[[float, str], None]
 """Called with the fraction that is done and a description of the current step."""
-
-
-class SizeRun(NamedTuple):
-    """A simulation with entry k at another size: deviations (k,), residual (m,), and the sensitivity to that entry
-    (m,).
-    """
-
-    k: int
-    z: np.ndarray
-    r: np.ndarray
-    column: np.ndarray
-
-
-def sizes_run(
-    problem: Problem,
-    z: np.ndarray,
-    here: np.ndarray,
-    at: Sequence[int],
-    scales: Sequence[float],
-    records: Sequence[int] | None = None,
-) -> list[SizeRun]:
-    """Simulate sizes of entries about z, in parallel; those whose simulation fails are left out.
-
-    A sensitivity is the difference quotient between neighbouring sizes: of an effect with a non-linear response it
-    differs from size to size.
-
-    Args:
-        problem: records and parameters.
-        z: where (k,).
-        here: the residual there (m,).
-        at: places of the entries.
-        scales: sizes, in effect scales, either way.
-        records: of which the residuals are; of all if not given.
-    """
-    jobs = [(k, size) for k in at for size in _sizes_tried(problem.entries[k].parameter, scales)]
-    moved = [np.concatenate([z[:k], [size], z[k + 1 :]]) for k, size in jobs]
-    of: dict[int, dict[float, np.ndarray]] = {k: {float(z[k]): here} for k in at}
-    for (k, size), r in zip(jobs, problem.residuals(moved, records), strict=True):
-        of[k][size] = r
-    found = [
-        SizeRun(k, there, of[k][size], _slope_at(of[k], size))
-        for (k, size), there in zip(jobs, moved, strict=True)
-    ]
-    return [each for each in found if np.isfinite(each.r).all() and np.isfinite(each.column).all()]
-
-
-def _slope_at(runs: Mapping[float, np.ndarray], size: float) -> np.ndarray:
-    """Return the sensitivity (m,) at a size, from the neighbouring sizes of runs, size → residual (m,); NaN if there
-    is none.
-    """
-    row = sorted(run for run in runs if run == size or np.isfinite(runs[run]).all())
-    i = row.index(size)
-    below, above = row[max(i - 1, 0)], row[min(i + 1, len(row) - 1)]
-    return (runs[below] - runs[above]) / (above - below if above > below else np.nan)
-
-
-def _sizes_tried(parameter: Parameter, scales: Sequence[float]) -> list[float]:
-    """Return the deviations that are tried, at some effect scales either way."""
-    both = [side * size * parameter.scale for size in scales for side in (1.0, -1.0)]
-    return [size for size in both if parameter.low <= size <= parameter.high]

@@ -374,18 +374,11 @@ class RunCache:
 
     Attributes:
         asked: how many simulations were requested.
-        onsets: responses to onsets along some simulations, of `change_point_scan`.
     """
 
     def __init__(self) -> None:
         """Begin empty."""
-        self.asked, self.onsets, self._store = 0, list[Any](), _Store()
-
-    def again(self) -> RunCache:
-        """Return a cache that counts from 0 and shares the tracks."""
-        new = RunCache()
-        new.onsets, new._store = self.onsets[:], self._store
-        return new
+        self.asked, self._store = 0, _Store()
 
     def count(self, runs: int) -> None:
         """Count requested simulations; the search depends on their number, so none may be lost between threads."""
