@@ -18,7 +18,8 @@ from subzero.diagnosis.hypothesis.noise import (
     CorrelationTimes,
     SensorPrior,
     correlation_times_of,
-    log_prior_of,
+    log_density,
+    prior_of,
     resolution_of,
     spikes,
 )
@@ -215,7 +216,9 @@ def test_what_is_known_of_a_time_is_a_normal_distribution_whose_variance_is_not_
     alone = SensorPrior(LEVEL, 0.0, False)
     for one, beside in zip(made, density, strict=True):
         normal = np.exp(-(np.log(one.correlation_time) ** 2) / (2.0 * 1.5**2)) / 1.5
-        assert log_prior_of(one, usual) - log_prior_of(one, alone) == pytest.approx(np.log(beside / normal))
+        at = np.log([one.white, one.slow, one.correlation_time])
+        found = log_density(at, prior_of(usual)) - log_density(at, prior_of(alone))
+        assert found == pytest.approx(np.log(beside / normal))
 
 
 A_LAG_BY_CHANCE = pytest.mark.xfail(

@@ -55,6 +55,7 @@ from subzero.diagnosis.inference.map_fit import (
     runnable,
 )
 from subzero.diagnosis.inference.posing import (
+    SensitiveRun,
     pose,
     rewhitened,
     sensitive_runs,
@@ -94,6 +95,7 @@ __all__ = [
     "Quadratic",
     "ResidualNoise",
     "RunCache",
+    "SensitiveRun",
     "SensorPrior",
     "bounded_step",
     "bounds",

@@ -21,6 +21,7 @@ from subzero.diagnosis.inference import (
     AXIS_WORDS,
     Problem,
     Progress,
+    SensitiveRun,
     respond,
     sensitive_runs,
     with_finer_steps,
@@ -126,10 +127,10 @@ def concluded(asked: Asked, outcome: Outcome, detectable: tuple[Detectability, .
         gain=rest.gain,
         next_trial=rest.next_trial,
         curves=rest.curves,
-        notes=(*outcome.verdict.notes, *_notes(problem, _tolerance_scale(outcome))),
+        notes=(*outcome.verdict.notes, *_notes(problem, _tolerance_scale(outcome), unstable)),
         seed=asked.seed,
         complete=outcome.search.complete,
-        unstable=unstable,
+        unstable=tuple(run.record for run in unstable),
     )
 
 
@@ -163,11 +164,11 @@ def decided(
     return (DATA_ERROR if errors else on_model), on_model
 
 
-def unstable_in(problem: Problem, reported: Fitted) -> tuple[str, ...]:
+def unstable_in(problem: Problem, reported: Fitted) -> tuple[SensitiveRun, ...]:
     """Return the records of an unstable motion, which no simulation follows for long."""
     z = reported.fit.z[: len(problem.entries)]
     finer = with_finer_steps(problem, z)
-    return tuple(run.record for run in sensitive_runs(finer, z)) if finer else ()
+    return sensitive_runs(finer, z) if finer else ()
 
 
 def _others(
@@ -296,10 +297,16 @@ SENTENCES = {
 }
 
 
-def _notes(problem: Problem, scale: Mapping[float, float]) -> Iterator[str]:
+def _notes(problem: Problem, scale: Mapping[float, float], unstable: Sequence[SensitiveRun]) -> Iterator[str]:
     """Yield further remarks for a reader."""
     if scale[WIDE] > scale[1.0]:
         yield f"The declared tolerances look too tight: {WIDE:g} times as wide explains the records best."
+    for run in unstable:
+        yield (
+            f"{run.record}: an unstable motion, which no simulation follows for long. At a vehicle that is a little "
+            f"different, steps err by {run.levels:.1f} noise levels of {run.channel} more or less. No force is named "
+            "in such a record; a shorter one of the same manoeuvre, or one that is steered less, says more."
+        )
     for record in problem.records:
         for channel, noise in record.noise.items():
             ratio = noise.sd / SPECS[channel].noise
