@@ -2,7 +2,7 @@
 how far parameters that it does not name are from their nominal values.
 
     R = rms(residual) / level of the sensor     after the unknown inputs, and in a free simulation without them
-    size / declared size                            of every unknown input
+    size / declared size                            of every unknown input that no term names
     |θ − c| / τ                                     of every parameter that no term names
 
 Where one of them is large, no cause and no error in the data is named, whatever its probability: evidence compares
@@ -62,7 +62,7 @@ class Nearness:
 
     Attributes:
         left: of every channel.
-        sizes: unknown input → (its size, the declared one). [unit of the input]
+        sizes: unknown input that is part of every explanation → (its size, the declared one). [unit of the input]
         bends: parameter that is not named → its deviation, in tolerances; the farthest first.
         reasons: why the model is not near; () if it is.
     """
@@ -83,7 +83,7 @@ def nearness(problem: Problem, fitted: Fit, free: Fit) -> Nearness:
     left = left_by(problem, fitted, free)
     sizes = {
         unknown.name: (fitted.linear.levels.sizes[unknown.name] * unknown.size, unknown.size)
-        for unknown in problem.model.unknown
+        for unknown in problem.model.always
     }
     bends = _bends(problem, fitted)
     reasons = [
