@@ -25,6 +25,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import moves_nothing, with_tolerances
 from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.inference.latent_force import AXIS_WORDS
 from subzero.diagnosis.inference.simulator import Stop, Track, economical, read, simulate_on, with_stops
 from subzero.errors import UserError
 from subzero.external_force import AXES, MissingForce
@@ -40,6 +41,8 @@ AXIS_SIZES = {"X": 0.02, "Y": 0.02, "Z": 0.02, "K": 0.0005, "M": 0.002, "N": 0.0
 """Usual size of what the hull's equations miss, by axis: some per cent of the drag at 1 m/s. [N, N m]"""
 AXIS_TIME_S = 4.0
 """Over which it changes. [s]"""
+ACTS = 15.0
+"""Size of a force that acts and that no cause explains, over what the hull's equations usually miss. [-]"""
 STOPS, SIMULATIONS_KEPT = 10, 8
 """A simulation can be taken up at so many times less one; so many of the latest are kept."""
 
@@ -51,7 +54,8 @@ def vehicle_model(
 
     Args:
         logged: records with their trials.
-        axes: of the hull on which unknown forces act, such as "XN"; each costs a simulation for every 4 s.
+        axes: of the hull on which unknown forces act in every explanation, such as "XN"; each costs a simulation for
+            every 4 s. On the others one is offered where nothing else explains a record.
 
     Raises:
         UserError: an axis does not exist.
@@ -72,7 +76,7 @@ def vehicle_model(
         inputs=[TRIAL, *inputs],
         parameters=[*_numbers(effects.values(), general.Number), *_numbers(START, general.Start)],
         causes=[_cause(effect) for effect in effects.values()],
-        unknown=[general.Unknown(axis, AXIS_SIZES[axis], AXIS_TIME_S) for axis in axes],
+        unknown=[_force(axis, usual=axis in axes) for axis in AXES],
     )
     records = [
         general.Record(
@@ -87,6 +91,18 @@ def vehicle_model(
         for k, (each, setting) in enumerate(zip(logged, settings, strict=True))
     ]
     return model, records
+
+
+def _force(axis: str, *, usual: bool) -> general.Unknown:
+    """Return a force on the hull that is not known: part of every explanation, or one that may act."""
+    return general.Unknown(
+        axis,
+        AXIS_SIZES[axis] * (1.0 if usual else ACTS),
+        AXIS_TIME_S,
+        usual=usual,
+        sentence=f"a {AXIS_WORDS[axis]} acts that no cause explains",
+        unit="N" if axis in "XYZ" else "N m",
+    )
 
 
 def _commands(setting: Setting) -> scenarios.Commands | None:

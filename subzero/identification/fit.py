@@ -69,11 +69,15 @@ def taken(problem: Problem, fitted: Fit) -> float:
 
         ½ log|C| − ½ log|C usual| + log prior(usual) − log prior,   C = Σ + J D Jᵀ
 
-    White noise is that of the fit in both: what has a history is no white noise.
+    White noise is that of the fit in both: what has a history is no white noise. A sensor that has less of it than it
+    may have is a slow one, and its slow noise is usual.
     """
     linear, usual = fitted.linear, usual_levels(problem, fitted.terms)
+    priors = {name: problem.prior(name, fitted.terms) for name in linear.levels.noise}
     noise = {
         name: replace(each, slow=min(each.slow, usual.noise[name].slow))
+        if each.white > priors[name].least
+        else each
         for name, each in linear.levels.noise.items()
     }
     calm = Levels(noise, {name: min(size, 1.0) for name, size in linear.levels.sizes.items()})

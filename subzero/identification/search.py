@@ -180,20 +180,23 @@ class Search:
 
     def _fit_unknown(self) -> bool:
         """Fit inputs that are 0 in a healthy model, where they may explain what nothing else does: with the best
-        explanation, and with no more of it than its gross errors. Return whether something was fitted.
+        explanation, with no more of it than its gross errors, and with nothing, as a large input may look like a gross
+        error. Return whether something was fitted.
         """
         best, before = self.ranked()[0], len(self.fits)
         if not self._unknown:
             return False
-        lacking = self._may_gain(best)
-        bases = [best] if lacking else []
-        if lacking or len(self._causes_of(best)) > 1:
-            bases.append(self._without_causes(best))
-        for base in bases:
-            if key(base.terms) not in self._offered and self._may_gain(base):
-                self._offered.add(key(base.terms))
-                self._fit_ranked(base.linear, self._ranked_unknown(base.linear))
+        self._fit_unknown_with(best)
+        if len(self.fits) > before or len(self._causes_of(best)) > 1:
+            self._fit_unknown_with(self._without_causes(best))
+            self._fit_unknown_with(self.fits[()])
         return len(self.fits) > before
+
+    def _fit_unknown_with(self, base: Fit) -> None:
+        """Fit unknown inputs with a base, once, where they may gain."""
+        if key(base.terms) not in self._offered and self._may_gain(base):
+            self._offered.add(key(base.terms))
+            self._fit_ranked(base.linear, self._ranked_unknown(base.linear))
 
     def _may_gain(self, base: Fit) -> bool:
         """Return whether slow noise takes as much of a base as an unknown input has to gain."""
