@@ -39,8 +39,8 @@ TRIAL = "trial"
 """Input by which the function knows which of several records it simulates."""
 AXIS_SIZES = {"X": 0.02, "Y": 0.02, "Z": 0.02, "K": 0.0005, "M": 0.002, "N": 0.002}
 """Usual size of what the hull's equations miss, by axis: some per cent of the drag at 1 m/s. [N, N m]"""
-AXIS_TIME_S = 4.0
-"""Over which it changes. [s]"""
+AXIS_TIME_S, ACTS_TIME_S = 4.0, 2.0
+"""Over which it changes: what the equations miss, and a force that no cause explains, which may be a knock. [s]"""
 ACTS = 15.0
 """Size of a force that acts and that no cause explains, over what the hull's equations usually miss. [-]"""
 STOPS, SIMULATIONS_KEPT = 10, 8
@@ -98,7 +98,7 @@ def _force(axis: str, *, usual: bool) -> general.Unknown:
     return general.Unknown(
         axis,
         AXIS_SIZES[axis] * (1.0 if usual else ACTS),
-        AXIS_TIME_S,
+        AXIS_TIME_S if usual else ACTS_TIME_S,
         usual=usual,
         sentence=f"a {AXIS_WORDS[axis]} acts that no cause explains",
         unit="N" if axis in "XYZ" else "N m",

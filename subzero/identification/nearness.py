@@ -117,6 +117,22 @@ def _errs_everywhere(problem: Problem, fitted: Fit) -> bool:
     return len(problem.channels) > 1 and soft >= set(problem.channels)
 
 
+def follows(problem: Problem, fitted: Fit) -> bool:
+    """Return whether an explanation leaves no more of a channel than its sensor may err."""
+    levels = problem.levels(fitted.terms)
+    return all(
+        rms(fitted.linear.e[name][problem.used(name, fitted.terms)])
+        <= NEAR_LEFT * _most(problem, name, level)
+        for name, level in levels.items()
+        if name in problem.channels
+    )
+
+
+def _most(problem: Problem, name: str, level: float) -> float:
+    """Return the most that a sensor errs, as well as its level is known. [unit of the channel]"""
+    return level * float(np.exp(problem.prior(name).spread))
+
+
 def left_by(problem: Problem, fitted: Fit, free: Fit) -> list[Left]:
     """Return what an explanation leaves of every channel."""
     levels = problem.levels(fitted.terms)
@@ -125,7 +141,7 @@ def left_by(problem: Problem, fitted: Fit, free: Fit) -> list[Left]:
             name,
             problem.model.channels[name].unit,
             levels[name],
-            levels[name] * float(np.exp(problem.prior(name).spread)),
+            _most(problem, name, levels[name]),
             rms(free.linear.e[name][used]),
             rms(fitted.linear.e[name][used]),
         )

@@ -41,6 +41,7 @@ from subzero.identification.fit import (
     taken,
     usual_levels,
 )
+from subzero.identification.nearness import follows
 from subzero.identification.problem import Problem, Progress
 
 MOST_TERMS = 8
@@ -199,7 +200,11 @@ class Search:
             self._fit_ranked(base.linear, self._ranked_unknown(base.linear))
 
     def _may_gain(self, base: Fit) -> bool:
-        """Return whether slow noise takes as much of a base as an unknown input has to gain."""
+        """Return whether a base leaves more than its sensors may err, or slow noise takes as much of it as an unknown
+        input has to gain.
+        """
+        if not follows(self.problem, base):
+            return True
         least = min(-math.log(term.odds) for term in self._unknown)
         return taken(self.problem, base) > least - WORTH
 
