@@ -19,7 +19,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize, minimize_scalar
 
 from subzero.identification.explanation import Entry, Terms
-from subzero.identification.noise import Filter, Noise, log_marginal
+from subzero.identification.noise import Filter, Noise, NoisePrior, log_marginal
 from subzero.identification.problem import Problem
 
 SIZE_SPREAD = 1.0
@@ -70,14 +70,11 @@ def taken(problem: Problem, fitted: Fit) -> float:
         ½ log|C| − ½ log|C usual| + log prior(usual) − log prior,   C = Σ + J D Jᵀ
 
     White noise is that of the fit in both: what has a history is no white noise. A sensor that has less of it than it
-    may have is a slow one, and its slow noise is usual.
+    may have is a slow one.
     """
-    linear, usual = fitted.linear, usual_levels(problem, fitted.terms)
-    priors = {name: problem.prior(name, fitted.terms) for name in linear.levels.noise}
+    linear = fitted.linear
     noise = {
-        name: replace(each, slow=min(each.slow, usual.noise[name].slow))
-        if each.white > priors[name].least
-        else each
+        name: replace(each, slow=min(each.slow, _usual_slow(problem.prior(name, fitted.terms), each)))
         for name, each in linear.levels.noise.items()
     }
     calm = Levels(noise, {name: min(size, 1.0) for name, size in linear.levels.sizes.items()})
@@ -90,6 +87,15 @@ def taken(problem: Problem, fitted: Fit) -> float:
         return total[3] + log_det - log_levels(problem, fitted.terms, levels)
 
     return cost(linear.levels) - cost(calm)
+
+
+def _usual_slow(prior: NoisePrior, noise: Noise) -> float:
+    """Return how much slow noise is usual beside the white noise of a fit: a share of the level; or, where white noise
+    is below the lower end of the level, what the level leaves, half way to its upper end. [unit of the channel]
+    """
+    if noise.white > prior.least:
+        return prior.usual().slow
+    return float(np.sqrt(prior.level * prior.most - noise.white**2))
 
 
 def quieter(problem: Problem, terms: Terms, levels: Levels) -> Levels:

@@ -109,7 +109,7 @@ def ids(terms):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, 1])
 @pytest.mark.parametrize("name, size", [("left", 0.3), ("right", 0.3), ("left", 0.05)])
 def test_a_hidden_force_is_named_on_the_right_cart_with_its_history(seed, name, size):
     true = hidden(seed, size)
@@ -129,7 +129,7 @@ def test_a_hidden_force_is_named_on_the_right_cart_with_its_history(seed, name, 
 @pytest.mark.long
 def test_three_standard_deviations_hold_at_nineteen_of_twenty_knots():
     found = []
-    for seed in range(10, 16):
+    for seed in range(10, 14):
         (named,) = sd.diagnose(record(seed, left=hidden(seed)), model()).named
         found.append(away(named.history[0], hidden(seed)))
     assert np.mean(np.abs(np.concatenate(found)) < 3.0) >= 0.95
