@@ -24,11 +24,13 @@ import numpy as np
 from subzero.identification.explanation import CLOCK, Entry, Term, Terms, without
 from subzero.identification.fit import Fit, free_fit
 from subzero.identification.model import COMMAND
-from subzero.identification.problem import Problem
+from subzero.identification.problem import FEWEST_SAMPLES, Problem
 from subzero.identification.record import Record
 
 FITTED_SHARE = 0.6
 """Share of a single record that is fitted, where the rest is predicted. [-]"""
+FEWEST_GAPS = 4.0
+"""A part that is left out is no longer than a record over this. [-]"""
 BLOCKS, DRAWS, SURE = 20, 2000, 0.05
 """Blocks of a record, draws of the bootstrap, and the share of them outside an interval, to either side."""
 
@@ -79,7 +81,7 @@ def locks(problem: Problem, best: Fit, held_out: Sequence[Record]) -> dict[str, 
     others = [term for term in tried if term not in histories]
     gains: dict[str, Gain] = {}
     if histories:
-        gains |= _gains(problem, best, histories, [_with_gaps(problem, gap)])
+        gains |= _gains(problem, best, histories, _with_gaps(problem, gap))
     if others:
         gains |= _gains(problem, best, others, _folds(problem, held_out, split, gap))
     return {term.id: _locks(problem, term, gains.get(term.id)) for term in terms}
@@ -134,26 +136,32 @@ def _begins_too_late(term: Term, split: float) -> bool:
 
 def _gap(problem: Problem, terms: Terms) -> float:
     """Return how long readings are left out at once: the time in which the quickest unknown input of an explanation
-    changes; ∞ if it has none. [s]
+    changes, or a part of the shortest record; ∞ if it has none. [s]
     """
     acting = {term.target for term in terms if term.kind == "unknown"}
-    return min([each.time for each in problem.model.offered if each.name in acting], default=math.inf)
+    times = [each.time for each in problem.model.offered if each.name in acting]
+    shortest = min(float(np.ptp(record.time)) for record in problem.records)
+    return min([*times, shortest / FEWEST_GAPS]) if times else math.inf
 
 
-def _with_gaps(problem: Problem, gap: float) -> Fold:
-    """Return the prediction of every second part of records, each as long as a gap [s], by a fit of the others."""
+def _with_gaps(problem: Problem, gap: float) -> list[Fold]:
+    """Return the prediction of every second part of records, each as long as a gap [s], by a fit of the others; none if
+    these are too few.
+    """
+    what = "every second part of the record by a fit of the others"
     seen = _seen(problem, gap)
-    return Fold(seen, problem, -math.inf, "every second part of the record by a fit of the others", seen=seen)
+    return [Fold(seen, problem, -math.inf, what, seen=seen)] if seen else []
 
 
-def _seen(whole: Problem, gap: float) -> Problem:
-    """Return records without every second part, each as long as a gap. [s]"""
+def _seen(whole: Problem, gap: float) -> Problem | None:
+    """Return records without every second part, each as long as a gap [s]; None if too few readings are left."""
     start = [record.time[0] for record in whole.records]
     gaps = {
         name: np.floor((each.time - np.take(start, each.record)) / gap) % 2 == 1
         for name, each in whole.channels.items()
     }
-    return Problem(whole.model, whole.without(gaps))
+    left = [(np.isfinite(each.values) & ~gaps[name]).sum() for name, each in whole.channels.items()]
+    return Problem(whole.model, whole.without(gaps)) if min(left) >= FEWEST_SAMPLES else None
 
 
 def _folds(problem: Problem, held_out: Sequence[Record], split: float, gap: float = math.inf) -> list[Fold]:
@@ -161,7 +169,7 @@ def _folds(problem: Problem, held_out: Sequence[Record], split: float, gap: floa
     a single one the last part by a fit of the first. With an unknown input the predicted records have gaps. [s]
     """
     if gap < math.inf and not held_out and len(problem.records) == 1:
-        return [_with_gaps(problem, gap)]
+        return _with_gaps(problem, gap)
     records, model = problem.records, problem.model
 
     def seen(there: Problem) -> Problem | None:
@@ -180,8 +188,10 @@ def _folds(problem: Problem, held_out: Sequence[Record], split: float, gap: floa
 
 
 def _gains(problem: Problem, best: Fit, tried: Sequence[Term], folds: Sequence[Fold]) -> dict[str, Gain]:
-    """Return the gain of terms in free simulation of what was not fitted: id → gain."""
+    """Return the gain of terms in free simulation of what was not fitted: id → gain; none if there is nothing."""
     having = _predicted(problem, best, best.terms, folds)
+    if not having:
+        return {}
     return {
         term.id: _gain(having, _predicted(problem, best, without(best.terms, term), folds), folds[0])
         for term in tried

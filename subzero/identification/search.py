@@ -188,7 +188,8 @@ class Search:
         if not self._unknown:
             return False
         self._fit_unknown_with(best)
-        if len(self.fits) > before or len(self._causes_of(best)) > 1:
+        doubtful = not follows(self.problem, best) or len(self._causes_of(best)) > 1
+        if len(self.fits) > before or doubtful:
             self._fit_unknown_with(self._without_causes(best))
             self._fit_unknown_with(self.fits[()])
         return len(self.fits) > before

@@ -268,3 +268,18 @@ def test_what_noise_takes_is_the_ratio_of_two_gaussian_volumes():
         return 0.5 * np.linalg.slogdet(C)[1] - problem.prior("y").log_density(noise)
 
     assert taken(problem, fitted) == pytest.approx(cost(wide) - cost(usual.noise["y"]), abs=1e-8)
+
+
+@pytest.mark.parametrize("samples", [12, 40])
+def test_a_force_that_is_slower_than_a_short_record_is_judged_all_the_same(samples):
+    time = np.arange(samples) * 1.0
+    y = 0.05 * np.random.default_rng(0).standard_normal(samples) + 3.0 * np.linspace(0.3, 1.0, samples)
+    model = sd.Model(
+        lambda p, u, t: {"y": u["push"] + 0.0 * t},
+        {"y": sd.Sensor(noise=0.05, trusted=True)},
+        unknown=[sd.Unknown("push", size=2.0, time=500.0, usual=False)],
+    )
+    (found,) = sd.diagnose(sd.Record(time, {"y": y}), model).named
+    assert found.id == "unknown:push"
+    assert (found.gain is None) == (samples == 12)  # too few are left to fit
+    assert np.abs(away(found.history[0], [0.9, 3.0])).max() < 3.0
