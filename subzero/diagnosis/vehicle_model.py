@@ -25,6 +25,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import is_absent, moves_nothing, with_tolerances
 from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.inference.latent_force import AXIS_WORDS
 from subzero.diagnosis.inference.simulator import (
     Stop,
     Track,
@@ -48,8 +49,10 @@ TRIAL = "trial"
 """Input by which the function knows which of several records it simulates."""
 AXIS_SIZES = {"X": 0.02, "Y": 0.02, "Z": 0.02, "K": 0.0005, "M": 0.002, "N": 0.002}
 """Usual size of what the hull's equations miss, by axis: some per cent of the drag at 1 m/s. [N, N m]"""
-AXIS_TIME_S = 4.0
-"""Over which it changes. [s]"""
+AXIS_TIME_S, ACTS_TIME_S = 4.0, 2.0
+"""Over which it changes: what the equations miss, and a force that no cause explains, which may be a knock. [s]"""
+ACTS = 15.0
+"""Size of a force that acts and that no cause explains, over what the hull's equations usually miss. [-]"""
 STOPS, SIMULATIONS_KEPT = 10, 8
 """A simulation can be taken up at so many times less one; so many of the latest are kept."""
 
@@ -62,7 +65,8 @@ def vehicle_model(
     Args:
         logged: records with their trials.
         effects: causes besides the catalogue.
-        axes: of the hull on which unknown forces act, such as "XN"; each costs a simulation for every 4 s.
+        axes: of the hull on which unknown forces act in every explanation, such as "XN"; each costs a simulation for
+            every 4 s. On the others one is offered where nothing else explains a record.
 
     Raises:
         UserError: an axis does not exist; the nominal model cannot be run through a trial.
@@ -84,7 +88,7 @@ def vehicle_model(
             *_numbers(known.starts, general.Start),
         ],
         causes=[*map(_cause, known.throughout.values()), *map(_onset, known.onsets.values())],
-        unknown=[general.Unknown(axis, AXIS_SIZES[axis], AXIS_TIME_S) for axis in axes],
+        unknown=[_force(axis, usual=axis in axes) for axis in AXES],
     )
     return model, [
         _record(k, each, setting, channels, inputs)
@@ -106,6 +110,18 @@ def _record(
     columns = {name: values[name] for name in channels if name in values}
     held = dict(zip(inputs, _held(setting, time), strict=True)) if inputs else {}
     return general.Record(time, {TRIAL: np.full(time.size, float(k)), **columns, **held}, name=logged.name)
+
+
+def _force(axis: str, *, usual: bool) -> general.Unknown:
+    """Return a force on the hull that is not known: part of every explanation, or one that may act."""
+    return general.Unknown(
+        axis,
+        AXIS_SIZES[axis] * (1.0 if usual else ACTS),
+        AXIS_TIME_S if usual else ACTS_TIME_S,
+        usual=usual,
+        sentence=f"a {AXIS_WORDS[axis]} acts that no cause explains",
+        unit="N" if axis in "XYZ" else "N m",
+    )
 
 
 def _commands(setting: Setting) -> scenarios.Commands | None:

@@ -32,8 +32,10 @@ from subzero.identification.verdict import (
     NOTHING_NEAR,
     NOTHING_WRONG,
     UNDECIDED,
+    UNKNOWN_NAMED,
     Curves,
     Estimate,
+    History,
     Named,
     Share,
     Verdict,
@@ -139,7 +141,7 @@ def _searched(
 def _concluded(search: Search, held_out: Sequence[Record], outliers: Mapping[str, int]) -> Verdict:
     problem, ranked = search.problem, search.ranked()
     best, probabilities = ranked[0], _probabilities(search, ranked)
-    free = free_fit(problem, best.terms, best.values)
+    free = free_fit(problem, best.terms, best.values, best.linear.levels.sizes)
     near = nearness(problem, best, free)
     marginal = _marginal(ranked, probabilities)
     own = locks(problem, best, held_out) if near.near else {}
@@ -190,8 +192,10 @@ def _kind(
 ) -> str:
     if not near.near:
         return NOTHING_NEAR
-    if any(not each.is_data_error for each in named):
+    if any(not each.is_data_error and not each.history for each in named):
         return CAUSE_NAMED
+    if any(each.history for each in named):
+        return UNKNOWN_NAMED
     if named:
         return DATA_ERROR
     if not best.terms and probabilities[0] >= HEALTHY_PROBABILITY:
@@ -204,8 +208,24 @@ def _named(
 ) -> Named:
     against = lock.reasons if lock else ("the model is not near",) if not near.near else ()
     gain = lock.gain if lock else None
+    if term.kind == "unknown":
+        history = _histories(problem, best, term.target)
+        return Named(term.id, term.sentence, False, probability, (), gain, against, history)
     estimates = _estimates(problem, best, term)
     return Named(term.id, term.sentence, term.is_data_error, probability, estimates, gain, against)
+
+
+def _histories(problem: Problem, best: Fit, name: str) -> tuple[History, ...]:
+    """Return an unknown input in each record."""
+    (unit,) = [each.unit for each in problem.model.unknown if each.name == name]
+    sd, found = np.sqrt(best.variance), []
+    for k, record in enumerate(problem.records):
+        own = [i for i, entry in enumerate(best.entries) if entry.identity[:3] == ("unknown", name, k)]
+        time = problem.knots[k][name].tolist()
+        found.append(
+            History(record.name, unit, tuple(time), tuple(best.x[own].tolist()), tuple(sd[own].tolist()))
+        )
+    return tuple(found)
 
 
 def _estimates(problem: Problem, best: Fit, term: Term) -> tuple[Estimate, ...]:
@@ -314,7 +334,8 @@ def _budget(search: Search, best: Fit, free: Fit) -> tuple[Share, ...]:
         term: _levels_left(problem, linear, levels) if linear else math.inf for term, linear in bare.items()
     }
     terms = sorted(best.terms, key=lambda term: -lacking[term])
-    fits = [free_fit(problem, tuple(terms[:count]), best.values) for count in range(len(terms))]
+    sizes = best.linear.levels.sizes
+    fits = [free_fit(problem, tuple(terms[:count]), best.values, sizes) for count in range(len(terms))]
     left = [_levels_left(problem, fitted.linear, levels) for fitted in (*fits, free)]
     return tuple(
         Share(term.id, before, after) for term, before, after in zip(terms, left[:-1], left[1:], strict=True)
@@ -329,7 +350,7 @@ def _levels_left(problem: Problem, linear: Linear, levels: Mapping[str, float]) 
 
 def _remainder(problem: Problem, best: Fit, near: Nearness) -> str:
     """Return where the remainder acts, and with which channel or input it grows."""
-    if near.near or not problem.model.unknown:
+    if near.near or not near.sizes:
         return ""
     name = max(near.sizes, key=lambda each: near.sizes[each][0] / near.sizes[each][1])
     rows = []

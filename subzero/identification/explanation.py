@@ -3,6 +3,7 @@ sentence.
 
     cause                numbers of an effect that is off by default, or a parameter that moves beyond its tolerance
     cause from a time    the same, with the time as a free number
+    unknown              an input that is 0 in a healthy model has some history
     tolerances           every parameter may move four times as far as its tolerance: a calibration, no cause
     data error           y = a + b x of a channel, with free a and b or at known values, throughout or from a time on
     drift                of a channel, a line in time
@@ -43,6 +44,8 @@ the rate of a clock. [-]"""
 PRIOR_CAUSE, MOST_LIKELY, PRIOR_TOLERANCES, PRIOR_DATA, PRIOR_NEXT_DATA = 0.5, 0.05, 0.1, 0.1, 0.3
 """Prior odds that any one cause acts, and most of a single one; that tolerances are too narrow; that the readings of a
 channel have any one error; and of such an error in a logger that has one already. [-]"""
+PRIOR_UNKNOWN = 0.05
+"""Prior odds that any one input acts that is 0 in a healthy model. [-]"""
 
 ONSET_ODDS = 0.2
 """Odds that a cause begins in the middle of a record, over those that it holds throughout. [-]"""
@@ -119,7 +122,8 @@ class Term:
     Attributes:
         id: such as "overflow", "overflow@12", "scale:depth", "unit:depth".
         sentence: what it says, in words.
-        kind: cause, tolerances, offset, scale, affine, unit, drift, delay, rate, swapped, stuck, input, exchanged.
+        kind: cause, unknown, tolerances, offset, scale, affine, unit, drift, delay, rate, swapped, stuck, input,
+            exchanged.
         target: the cause, the channel, or the input.
         partner: the other one of two that are swapped or exchanged.
         odds: prior odds that it holds.
@@ -148,7 +152,7 @@ class Term:
     @property
     def is_data_error(self) -> bool:
         """Whether it is about the record, not about the model."""
-        return self.kind not in ("cause", "tolerances")
+        return self.kind not in ("cause", "unknown", "tolerances")
 
     def about(self, target: str) -> Term:
         """Return the same error of another channel."""
@@ -228,6 +232,21 @@ def cause_terms(model: Model, durations: Sequence[float]) -> list[Term]:
             )
             found += [replace(late, begins=share * duration) for share in ONSET_SHARES]
     return found
+
+
+def unknown_terms(model: Model) -> list[Term]:
+    """Return a term of every input that is 0 in a healthy model, and may act as nobody knows."""
+    odds = PRIOR_UNKNOWN / max(len(model.offered), 1)
+    return [
+        Term(
+            f"unknown:{each.name}",
+            each.sentence or f"something acts on {each.name} that no cause of the list explains",
+            "unknown",
+            each.name,
+            odds,
+        )
+        for each in model.offered
+    ]
 
 
 def tolerance_term(model: Model) -> Term:

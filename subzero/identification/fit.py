@@ -12,13 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize, minimize_scalar
 
 from subzero.identification.explanation import Entry, Terms
-from subzero.identification.noise import Filter, Noise, log_marginal
+from subzero.identification.noise import Filter, Noise, NoisePrior, log_marginal
 from subzero.identification.problem import Problem
 
 SIZE_SPREAD = 1.0
@@ -40,6 +41,9 @@ INVISIBLE = 1e-3
 SIZE_RANGE = (-5.0, 6.0)
 """Sizes of unknown inputs that are looked at, as logarithms of their ratio to the declared one. [-]"""
 
+NO_SIZES: Mapping[str, float] = MappingProxyType({})
+"""Unknown inputs have their declared sizes."""
+
 
 @dataclass(frozen=True)
 class Levels:
@@ -57,6 +61,41 @@ def usual_levels(problem: Problem, terms: Terms) -> Levels:
         {name: problem.prior(name, terms).usual() for name in problem.channels},
         {unknown.name: 1.0 for unknown in problem.model.unknown},
     )
+
+
+def taken(problem: Problem, fitted: Fit) -> float:
+    """Return what slow noise and unknown inputs take that are larger than usual, in nats: no term gains more by
+    explaining it.
+
+        ½ log|C| − ½ log|C usual| + log prior(usual) − log prior,   C = Σ + J D Jᵀ
+
+    White noise is that of the fit in both: what has a history is no white noise. A sensor that has less of it than it
+    may have is a slow one.
+    """
+    linear = fitted.linear
+    noise = {
+        name: replace(each, slow=min(each.slow, _usual_slow(problem.prior(name, fitted.terms), each)))
+        for name, each in linear.levels.noise.items()
+    }
+    calm = Levels(noise, {name: min(size, 1.0) for name, size in linear.levels.sizes.items()})
+    products = Products(problem, linear.terms, linear.e, linear.J)
+
+    def cost(levels: Levels) -> float:
+        total = products.total(levels.noise)
+        factor = solve(total, linear.entries, levels, linear.off)[2]
+        log_det = float(np.sum(np.log(np.diag(factor[0]))))
+        return total[3] + log_det - log_levels(problem, fitted.terms, levels)
+
+    return cost(linear.levels) - cost(calm)
+
+
+def _usual_slow(prior: NoisePrior, noise: Noise) -> float:
+    """Return how much slow noise is usual beside the white noise of a fit: a share of the level; or, where white noise
+    is below the lower end of the level, what the level leaves, half way to its upper end. [unit of the channel]
+    """
+    if noise.white > prior.least:
+        return prior.usual().slow
+    return float(np.sqrt(prior.level * prior.most - noise.white**2))
 
 
 def quieter(problem: Problem, terms: Terms, levels: Levels) -> Levels:
@@ -188,7 +227,7 @@ def log_levels(problem: Problem, terms: Terms, levels: Levels) -> float:
     """Return the log prior density of noise and sizes, up to a constant."""
     noise = sum(problem.prior(name, terms).log_density(each) for name, each in levels.noise.items())
     sizes = sum(
-        -0.5 * (np.log(levels.sizes[unknown.name]) / SIZE_SPREAD) ** 2 for unknown in problem.model.unknown
+        -0.5 * (np.log(levels.sizes[unknown.name]) / SIZE_SPREAD) ** 2 for unknown in problem.unknown(terms)
     )
     return float(noise + sizes)
 
@@ -234,7 +273,7 @@ def bounds(entries: Sequence[Entry]) -> tuple[np.ndarray, np.ndarray]:
 def fitted_levels(problem: Problem, linear: Linear) -> Levels:
     """Return the noise and the sizes that have the highest evidence in a linear problem, one after the other."""
     products, levels = Products(problem, linear.terms, linear.e, linear.J), linear.levels
-    for unknown in problem.model.unknown:
+    for unknown in problem.unknown(linear.terms):
         levels = _best_size(problem, linear, products, levels, unknown.name)
     for name in linear.e:
         levels = _best_noise(problem, linear, products, levels, name)
@@ -386,17 +425,28 @@ def _is_linear(problem: Problem, origin: Linear, there: Linear) -> bool:
     return missed < max(2.0 * ENOUGH, SLOPE_ERROR**2 * moved)
 
 
-def free_fit(problem: Problem, terms: Terms, start: Mapping[Entry, float]) -> Fit:
-    """Return the fit of an explanation in free simulation: unknown inputs are 0, and the residual is the noise.
+def free_fit(
+    problem: Problem, terms: Terms, start: Mapping[Entry, float], sizes: Mapping[str, float] = NO_SIZES
+) -> Fit:
+    """Return the fit of an explanation in free simulation: unknown inputs that no term names are 0, and the residual is
+    the noise.
 
     It says how well an explanation predicts, where `fit` says how probable it is.
+
+    Args:
+        problem: of the explanation.
+        terms: of the explanation.
+        start: values of its numbers.
+        sizes: of unknown inputs, over the declared ones; these if not given. [-]
     """
     fixed = {entry.identity: 0.0 for entry in problem.entries(()) if entry.kind == "unknown"}
     free = problem.with_fixed(fixed)
     entries = free.entries(terms)
-    known = {entry.identity: value for entry, value in start.items() if entry.kind != "unknown"}
+    known = {entry.identity: value for entry, value in start.items() if entry.identity not in fixed}
     x = np.clip(np.array([known.get(entry.identity, entry.centre) for entry in entries]), *bounds(entries))
-    linear = origin = linearised(free, terms, entries, x, usual_levels(free, terms))
+    usual = usual_levels(free, terms)
+    levels = replace(usual, sizes={**usual.sizes, **sizes})
+    linear = origin = linearised(free, terms, entries, x, levels)
     for _ in range(ROUNDS):
         before = _left(free, linear)
         noise = {

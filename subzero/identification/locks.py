@@ -6,6 +6,9 @@ tolerances are a term of the search: what they explain as well is undecided ther
 
     gain = Σ (e/ν)² without the term − Σ (e/ν)² with it     in free simulation of readings that were not fitted
 
+A history says nothing about another time: where an explanation has an unknown input, every second part of a record is
+left out, and predicted.
+
 The interval of the gain is a bootstrap over blocks of time (Künsch 1989), as residuals are correlated.
 """
 
@@ -21,11 +24,13 @@ import numpy as np
 from subzero.identification.explanation import CLOCK, Entry, Term, Terms, without
 from subzero.identification.fit import Fit, free_fit
 from subzero.identification.model import COMMAND
-from subzero.identification.problem import Problem
+from subzero.identification.problem import FEWEST_SAMPLES, Problem
 from subzero.identification.record import Record
 
 FITTED_SHARE = 0.6
 """Share of a single record that is fitted, where the rest is predicted. [-]"""
+FEWEST_GAPS = 4.0
+"""A part that is left out is no longer than a record over this. [-]"""
 BLOCKS, DRAWS, SURE = 20, 2000, 0.05
 """Blocks of a record, draws of the bootstrap, and the share of them outside an interval, to either side."""
 
@@ -69,9 +74,16 @@ class Locks:
 
 def locks(problem: Problem, best: Fit, held_out: Sequence[Record]) -> dict[str, Locks]:
     """Return the locks of every term of the best explanation: id → locks."""
-    terms, split = [term for term in best.terms if term.kind != "tolerances"], _split(problem, held_out)
+    terms, gap = [term for term in best.terms if term.kind != "tolerances"], _gap(problem, best.terms)
+    split = _split(problem, held_out) if gap == math.inf else -math.inf
     tried = [term for term in terms if not _begins_too_late(term, split)]
-    gains = _gains(problem, best, tried, _folds(problem, held_out, split)) if tried else {}
+    histories = [term for term in tried if term.kind == "unknown"]
+    others = [term for term in tried if term not in histories]
+    gains: dict[str, Gain] = {}
+    if histories:
+        gains |= _gains(problem, best, histories, _with_gaps(problem, gap))
+    if others:
+        gains |= _gains(problem, best, others, _folds(problem, held_out, split, gap))
     return {term.id: _locks(problem, term, gains.get(term.id)) for term in terms}
 
 
@@ -89,13 +101,16 @@ def _late_commands(problem: Problem, term: Term) -> list[str]:
     """Return the commands that may as well act late: those that may be off, if all readings are late together."""
     if term.kind != "delay" or (term.target != CLOCK and len(problem.channels) > 1):
         return []
-    names = [each.name for each in problem.model.unknown]
+    names = [each.name for each in problem.model.always]
     return [name.removeprefix(COMMAND) for name in names if name.startswith(COMMAND)]
 
 
 class Fold(NamedTuple):
     """Records that are fitted, records that are predicted, the time from which predictions count [s], and what these
     are: records that were held out, if it is strict.
+
+    Starts and histories of the predicted records are those of what is seen of them: all, or what gaps leave, and then
+    only what is not seen counts.
     """
 
     fitted: Problem
@@ -103,6 +118,7 @@ class Fold(NamedTuple):
     begin: float
     what: str
     strict: bool = False
+    seen: Problem | None = None
 
 
 def _split(problem: Problem, held_out: Sequence[Record]) -> float:
@@ -118,26 +134,64 @@ def _begins_too_late(term: Term, split: float) -> bool:
     return split > -math.inf and late
 
 
-def _folds(problem: Problem, held_out: Sequence[Record], split: float) -> list[Fold]:
-    """Return the predictions to make: of records that were held out; of several records each by a fit of the others; of
-    a single one the last part by a fit of the first.
+def _gap(problem: Problem, terms: Terms) -> float:
+    """Return how long readings are left out at once: the time in which the quickest unknown input of an explanation
+    changes, or a part of the shortest record; ∞ if it has none. [s]
     """
+    acting = {term.target for term in terms if term.kind == "unknown"}
+    times = [each.time for each in problem.model.offered if each.name in acting]
+    shortest = min(float(np.ptp(record.time)) for record in problem.records)
+    return min([*times, shortest / FEWEST_GAPS]) if times else math.inf
+
+
+def _with_gaps(problem: Problem, gap: float) -> list[Fold]:
+    """Return the prediction of every second part of records, each as long as a gap [s], by a fit of the others; none if
+    these are too few.
+    """
+    what = "every second part of the record by a fit of the others"
+    seen = _seen(problem, gap)
+    return [Fold(seen, problem, -math.inf, what, seen=seen)] if seen else []
+
+
+def _seen(whole: Problem, gap: float) -> Problem | None:
+    """Return records without every second part, each as long as a gap [s]; None if too few readings are left."""
+    start = [record.time[0] for record in whole.records]
+    gaps = {
+        name: np.floor((each.time - np.take(start, each.record)) / gap) % 2 == 1
+        for name, each in whole.channels.items()
+    }
+    left = [(np.isfinite(each.values) & ~gaps[name]).sum() for name, each in whole.channels.items()]
+    return Problem(whole.model, whole.without(gaps)) if min(left) >= FEWEST_SAMPLES else None
+
+
+def _folds(problem: Problem, held_out: Sequence[Record], split: float, gap: float = math.inf) -> list[Fold]:
+    """Return the predictions to make: of records that were held out; of several records each by a fit of the others; of
+    a single one the last part by a fit of the first. With an unknown input the predicted records have gaps. [s]
+    """
+    if gap < math.inf and not held_out and len(problem.records) == 1:
+        return _with_gaps(problem, gap)
     records, model = problem.records, problem.model
+
+    def seen(there: Problem) -> Problem | None:
+        return _seen(there, gap) if gap < math.inf else None
+
     if held_out:
         there = Problem(model, held_out)
-        return [Fold(problem, there, split, "the records that were held out", strict=True)]
+        return [Fold(problem, there, split, "the records that were held out", strict=True, seen=seen(there))]
     if split > -math.inf:
         first = Problem(model, [records[0].between(-math.inf, split)])
         return [Fold(first, problem, split, "the last part of the record by a fit of the first")]
     parts = [
         (Problem(model, records[:k] + records[k + 1 :]), Problem(model, [r])) for k, r in enumerate(records)
     ]
-    return [Fold(*part, split, "each record by a fit of the others") for part in parts]
+    return [Fold(*part, split, "each record by a fit of the others", seen=seen(part[1])) for part in parts]
 
 
 def _gains(problem: Problem, best: Fit, tried: Sequence[Term], folds: Sequence[Fold]) -> dict[str, Gain]:
-    """Return the gain of terms in free simulation of what was not fitted: id → gain."""
+    """Return the gain of terms in free simulation of what was not fitted: id → gain; none if there is nothing."""
     having = _predicted(problem, best, best.terms, folds)
+    if not having:
+        return {}
     return {
         term.id: _gain(having, _predicted(problem, best, without(best.terms, term), folds), folds[0])
         for term in tried
@@ -150,17 +204,22 @@ Squares = tuple[np.ndarray, np.ndarray]
 
 def _predicted(problem: Problem, best: Fit, terms: Terms, folds: Sequence[Fold]) -> list[Squares]:
     """Return the squares of predictions: for each channel of a fold."""
-    squares, levels = [], problem.levels(best.terms)
+    squares, levels, sizes = [], problem.levels(best.terms), best.linear.levels.sizes
     for fold in folds:
         here = tuple(replace(term, record=-1) for term in terms)
-        learned = free_fit(fold.fitted, here, _shared(best))
+        learned = free_fit(fold.fitted, here, _shared(best), sizes)
         fixed = {entry.identity: value for entry, value in learned.values.items() if entry.record < 0}
         there = fold.predicted.with_fixed(fixed)
-        predicted = free_fit(there, here, learned.values if fold.begin > -math.inf else {})
-        for name, e in predicted.linear.e.items():
+        known = learned.values if fold.begin > -math.inf or fold.seen is fold.fitted else {}
+        seen = fold.seen.with_fixed(fixed) if fold.seen else there
+        predicted = free_fit(seen, here, known, sizes)
+        e, _ = there.residuals(here, predicted.entries, [predicted.x])
+        for name in predicted.linear.e:
             kept = there.used(name, here) & (there.channels[name].time > fold.begin)
+            if fold.seen:
+                kept &= ~np.isfinite(seen.channels[name].values)
             if name in levels and kept.any():
-                squares.append(((e[kept] / levels[name]) ** 2, kept))
+                squares.append(((e[name][kept, 0] / levels[name]) ** 2, kept))
     return squares
 
 

@@ -212,17 +212,24 @@ class Unknown:
     """An input that is not known: where it acts, how large it usually is, and how quickly it changes.
 
     The function finds it in ``u[name]``; of "command:pump", added to ``u["pump"]``. It is 0 but for a Gaussian process,
-    which is part of every explanation.
+    which is part of every explanation if it is usual. If not, it is 0 in a healthy model, and a term of an explanation
+    where it acts: ``Unknown("push", size=0.5, time=2.0, usual=False)``.
 
     Attributes:
         name: of the input.
-        size: its usual standard deviation in a healthy model. [unit of the input]
+        size: its usual standard deviation in a healthy model, or where it acts if it is not usual. [unit of the input]
         time: over which it changes. [s]
+        usual: whether it is part of every explanation.
+        sentence: what a verdict says if it acts, in words; as one that is not usual.
+        unit: as it is shown.
     """
 
     name: str
     size: float
     time: float
+    usual: bool = True
+    sentence: str = ""
+    unit: str = ""
 
     def __post_init__(self) -> None:
         positive(f"the size of the unknown input {self.name!r}", self.size)
@@ -239,7 +246,7 @@ class Model:
         inputs: names of the inputs that it reads from a record.
         parameters: its numbers, and the states at the beginning of a record.
         causes: what may be wrong.
-        unknown: inputs that are not known.
+        unknown: inputs that are not known: part of every explanation, or offered as a term of one.
         tuned_on: parameter → channels through which it was tuned: an error of such a channel moves the parameter.
         batch: whether it computes many sets at once: numbers are (k,), inputs (n, 1) or (n, k), readings (n, k).
     """
@@ -286,6 +293,16 @@ class Model:
     def starts(self) -> list[Start]:
         """Parameters that each record has its own of."""
         return [number for number in self.parameters if isinstance(number, Start)]
+
+    @property
+    def always(self) -> list[Unknown]:
+        """Unknown inputs that are part of every explanation."""
+        return [unknown for unknown in self.unknown if unknown.usual]
+
+    @property
+    def offered(self) -> list[Unknown]:
+        """Unknown inputs that are terms of an explanation: 0 in a healthy model."""
+        return [unknown for unknown in self.unknown if not unknown.usual]
 
     def nominal(self) -> dict[str, Any]:
         """Return the nominal parameters, with every cause off."""

@@ -2,7 +2,7 @@
 how far parameters that it does not name are from their nominal values.
 
     R = rms(residual) / level of the sensor     after the unknown inputs, and in a free simulation without them
-    size / declared size                            of every unknown input
+    size / declared size                            of every unknown input that no term names
     |θ − c| / τ                                     of every parameter that no term names
 
 Where one of them is large, no cause and no error in the data is named, whatever its probability: evidence compares
@@ -62,7 +62,7 @@ class Nearness:
 
     Attributes:
         left: of every channel.
-        sizes: unknown input → (its size, the declared one). [unit of the input]
+        sizes: unknown input that is part of every explanation → (its size, the declared one). [unit of the input]
         bends: parameter that is not named → its deviation, in tolerances; the farthest first.
         reasons: why the model is not near; () if it is.
     """
@@ -83,7 +83,7 @@ def nearness(problem: Problem, fitted: Fit, free: Fit) -> Nearness:
     left = left_by(problem, fitted, free)
     sizes = {
         unknown.name: (fitted.linear.levels.sizes[unknown.name] * unknown.size, unknown.size)
-        for unknown in problem.model.unknown
+        for unknown in problem.model.always
     }
     bends = _bends(problem, fitted)
     reasons = [
@@ -117,6 +117,22 @@ def _errs_everywhere(problem: Problem, fitted: Fit) -> bool:
     return len(problem.channels) > 1 and soft >= set(problem.channels)
 
 
+def follows(problem: Problem, fitted: Fit) -> bool:
+    """Return whether an explanation leaves no more of a channel than its sensor may err."""
+    levels = problem.levels(fitted.terms)
+    return all(
+        rms(fitted.linear.e[name][problem.used(name, fitted.terms)])
+        <= NEAR_LEFT * _most(problem, name, level)
+        for name, level in levels.items()
+        if name in problem.channels
+    )
+
+
+def _most(problem: Problem, name: str, level: float) -> float:
+    """Return the most that a sensor errs, as well as its level is known. [unit of the channel]"""
+    return level * float(np.exp(problem.prior(name).spread))
+
+
 def left_by(problem: Problem, fitted: Fit, free: Fit) -> list[Left]:
     """Return what an explanation leaves of every channel."""
     levels = problem.levels(fitted.terms)
@@ -125,7 +141,7 @@ def left_by(problem: Problem, fitted: Fit, free: Fit) -> list[Left]:
             name,
             problem.model.channels[name].unit,
             levels[name],
-            levels[name] * float(np.exp(problem.prior(name).spread)),
+            _most(problem, name, levels[name]),
             rms(free.linear.e[name][used]),
             rms(fitted.linear.e[name][used]),
         )

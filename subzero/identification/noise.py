@@ -64,6 +64,11 @@ class NoisePrior:
         """The level at its upper end: a slow part that is larger is no noise of a sensor. [unit of the channel]"""
         return self.level * float(np.exp(self.spread))
 
+    @property
+    def least(self) -> float:
+        """The level at its lower end. [unit of the channel]"""
+        return self.level * float(np.exp(-self.spread))
+
     def usual(self) -> Noise:
         """Return the noise at its median."""
         return Noise(self.level, SLOW_SHARE * self.level, 10.0 * self.interval)

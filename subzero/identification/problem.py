@@ -12,7 +12,7 @@ import numpy as np
 
 from subzero.errors import UserError
 from subzero.identification.explanation import AFFINE, CLOCK, KNOWN, Entry, Term, Terms, entries_of
-from subzero.identification.model import Model
+from subzero.identification.model import Model, Unknown
 from subzero.identification.noise import (
     MEDIAN_TO_SD,
     OPEN_SPREAD,
@@ -279,6 +279,11 @@ class Problem:
             found.append({name: np.linspace(start, end, count) for name, count in counts.items()})
         return found
 
+    def unknown(self, terms: Terms) -> list[Unknown]:
+        """Return the unknown inputs of an explanation: the usual ones, and those that its terms say."""
+        acting = {term.target for term in terms if term.kind == "unknown"}
+        return [each for each in self.model.unknown if each.usual or each.name in acting]
+
     def entries(self, terms: Terms) -> list[Entry]:
         """Return all free numbers of an explanation: of the model, its terms, starts and unknown inputs."""
         own = entries_of(terms, self.model, self.levels(terms), self.delays)
@@ -290,7 +295,7 @@ class Problem:
         unknown = [
             Entry("unknown", each.name, 0.0, each.size, k, knot=i)
             for k in range(len(self.records))
-            for each in self.model.unknown
+            for each in self.unknown(terms)
             for i in range(self.knots[k][each.name].size)
         ]
         return [self._as_fixed(entry) for entry in (*own, *starts, *unknown)]

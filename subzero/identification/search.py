@@ -3,6 +3,9 @@
 It begins twice: at the nominal model, where gross errors in the data are plain whatever a fit would bend, and at the
 fit of "nothing is wrong". Without a gross error a fit moves the parameters to suit the wrong readings: what may stand
 in its place is judged where the fit with it ends.
+
+Inputs that are 0 in a healthy model cost a simulation for each knot. They are offered when nothing else gains, where
+noise takes more than is usual: with the best explanation, and without the causes in it.
 """
 
 from __future__ import annotations
@@ -16,7 +19,16 @@ import numpy as np
 from scipy.special import logsumexp
 
 from subzero.identification.candidates import declared, suggested
-from subzero.identification.explanation import CLOCK, Entry, Term, Terms, log_prior, with_term, without
+from subzero.identification.explanation import (
+    CLOCK,
+    Entry,
+    Term,
+    Terms,
+    log_prior,
+    unknown_terms,
+    with_term,
+    without,
+)
 from subzero.identification.fit import (
     Fit,
     Linear,
@@ -26,8 +38,10 @@ from subzero.identification.fit import (
     linearised,
     quieter,
     starting_point,
+    taken,
     usual_levels,
 )
+from subzero.identification.nearness import follows
 from subzero.identification.problem import Problem, Progress
 
 MOST_TERMS = 8
@@ -41,7 +55,7 @@ WORTH, GROSS = 3.0, 100.0
 GROSS_KINDS = ("unit", "affine", "swapped", "input", "exchanged", "stuck")
 """Errors in the data that may be gross, as those of all channels' clock and those that begin in mid-record may."""
 OF_MODEL = ("number", "start", "unknown")
-"""Kinds of entries that every explanation has."""
+"""Kinds of entries that every explanation has, and histories: these begin at 0."""
 TWINS = ("offset", "scale", "affine", "delay")
 """Errors that another channel of the unit may have in the place of the first one."""
 FEW_CAUSES = 12
@@ -114,7 +128,8 @@ class Search:
         self._left: set[Key] = set()
         self._tried: set[Key] = set()
         self._added: dict[int, tuple[Linear, list[tuple[float, Linear]]]] = {}
-        self._terms = declared(self.problem)
+        self._offered: set[Key] = set()
+        self._terms, self._unknown = declared(self.problem), unknown_terms(self.problem.model)
         # Offsets are among them for those that begin in mid-record.
         self._gross = [term for term in self._terms if term.kind == "offset" or _is_gross_kind(term)]
         self._loggers = {name: sensor.logger for name, sensor in self.problem.model.channels.items()}
@@ -150,7 +165,7 @@ class Search:
 
     def screen(self) -> None:
         """Rank all single terms in the linear problem around the fit of "nothing is wrong"."""
-        self._fit_additions(self._fit(self._nominal()).linear, most=0)
+        self._best_additions(self._fit(self._nominal()).linear)
         self.complete = False
 
     def _nominal(self) -> Linear:
@@ -168,11 +183,70 @@ class Search:
             self._fit(linearised(problem, fitted.terms, fitted.entries, fitted.x, fitted.linear.levels))
         for first in {key(each.terms): each for each in (self.fits[()], self.ranked()[0])}.values():
             self._fit_single_causes(first)
-        while (base := self._next()) is not None:
+        while (base := self._next()) is not None or self._fit_unknown():
             if len(self.fits) >= MOST_FITS:
                 self.complete = False
                 return
-            self._expand(base)
+            if base is not None:
+                self._expand(base)
+
+    def _fit_unknown(self) -> bool:
+        """Fit inputs that are 0 in a healthy model, where they may explain what nothing else does: with the best
+        explanation, with no more of it than its gross errors, and with nothing, as a large input may look like a gross
+        error. Return whether something was fitted.
+        """
+        best, before = self.ranked()[0], len(self.fits)
+        if not self._unknown:
+            return False
+        self._fit_unknown_with(best)
+        doubtful = not follows(self.problem, best) or len(self._causes_of(best)) > 1
+        if len(self.fits) > before or doubtful:
+            self._fit_unknown_with(self._without_causes(best))
+            self._fit_unknown_with(self.fits[()])
+        return len(self.fits) > before
+
+    def _fit_unknown_with(self, base: Fit) -> None:
+        """Fit unknown inputs with a base, once, where they may gain."""
+        if key(base.terms) not in self._offered and self._may_gain(base):
+            self._offered.add(key(base.terms))
+            self._fit_ranked(base.linear, self._ranked_unknown(base.linear))
+
+    def _may_gain(self, base: Fit) -> bool:
+        """Return whether a base leaves more than its sensors may err, or slow noise takes as much of it as an unknown
+        input has to gain.
+        """
+        if not follows(self.problem, base):
+            return True
+        least = min(-math.log(term.odds) for term in self._unknown)
+        return taken(self.problem, base) > least - WORTH
+
+    def _causes_of(self, base: Fit) -> list[Term]:
+        """Return the terms of an explanation but for gross errors in the data: an unknown input may look like them."""
+        return [term for term in base.terms if term.kind != "unknown" and not self._is_gross(base, term)]
+
+    def _without_causes(self, base: Fit) -> Fit:
+        """Return the fit of an explanation with no more than its gross errors in the data."""
+        causes = self._causes_of(base)
+        terms = tuple(term for term in base.terms if term not in causes and term.kind != "unknown")
+        if key(terms) in self.fits:
+            return self.fits[key(terms)]
+        bare = self.there(base.linear, terms)
+        return self._fit(bare) if bare else base
+
+    def _ranked_unknown(self, base: Linear) -> list[tuple[float, Linear]]:
+        """Return explanations with one unknown input more with their scores, ranked with their own noise."""
+        if len(base.terms) >= MOST_TERMS:
+            return []
+        there = [
+            self.there(base, with_term(base.terms, term), term)
+            for term in self._unknown
+            if term not in base.terms
+        ]
+        found = [(self._linear_score(linear), linear) for linear in there if linear]
+        self.ranks.setdefault(key(base.terms), {}).update({key(each.terms): score for score, each in found})
+        found.sort(key=lambda pair: -pair[0])
+        again = [self._with_own_noise(linear) for linear in self._worth_own_noise(found)]
+        return self._distinct(sorted(again, key=lambda pair: -pair[0]))
 
     def _fit_single_causes(self, base: Fit) -> None:
         """Fit each cause with a base, if there are few: a rank is of the linear problem, which may be blind to what a
@@ -250,14 +324,18 @@ class Search:
         ranked = self._distinct(sorted(found, key=lambda pair: -pair[0]))[:FITTED]
         return [self._fit(linear, score) for score, linear in ranked if score > self.score(base) - WITHIN]
 
-    def _fit_additions(self, base: Linear, most: int = FITTED) -> None:
+    def _fit_additions(self, base: Linear) -> None:
         """Fit the best explanations with one term more, except those that are ranked far below the best of all fits.
 
         What is ranked like the first of them is fitted, too, however well that one does: a rank is of the linear
         problem, which may be too strict with all of them, and twins have one rank.
         """
-        here, added = self._linear_score(base), self._best_additions(base)[:FITTED]
-        for score, linear in added[:most]:
+        self._fit_ranked(base, self._best_additions(base))
+
+    def _fit_ranked(self, base: Linear, ranked: list[tuple[float, Linear]]) -> None:
+        """Fit the first of explanations with one term more than a base, which are ranked."""
+        here, added = self._linear_score(base), ranked[:FITTED]
+        for score, linear in added:
             if score > max(here - WORTH, min(self.score(self.ranked()[0]), added[0][0]) - WITHIN):
                 self._fit(linear, score)
 

@@ -15,10 +15,11 @@ from subzero.identification.locks import Gain
 from subzero.identification.nearness import Nearness
 from subzero.identification.record import Record
 
-NOTHING_WRONG, CALIBRATED, CAUSE_NAMED, DATA_ERROR, UNDECIDED, NOTHING_NEAR = (
+NOTHING_WRONG, CALIBRATED, CAUSE_NAMED, UNKNOWN_NAMED, DATA_ERROR, UNDECIDED, NOTHING_NEAR = (
     "nothing_wrong",
     "calibrated",
     "cause_named",
+    "unknown_input",
     "data_error",
     "undecided",
     "nothing_near",
@@ -29,13 +30,14 @@ HEADLINES = {
     NOTHING_WRONG: "Nothing is wrong.",
     CALIBRATED: "No single cause: the parameters are farther off than their tolerances say.",
     CAUSE_NAMED: "A cause is named.",
+    UNKNOWN_NAMED: "Something acts that no cause of the list explains.",
     DATA_ERROR: "The data have an error.",
     UNDECIDED: "Undecided.",
     NOTHING_NEAR: "The model is not near these records. Nothing is named.",
 }
 
-SHOWN, SIZES_SHOWN = 5, 12
-"""So many explanations are shown; and so many sizes that would be seen."""
+SHOWN, SIZES_SHOWN, KNOTS_SHOWN = 5, 12, 16
+"""So many explanations are shown; so many sizes that would be seen; and at most so many knots of a history."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +51,24 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class History:
+    """An unknown input in a record, linear between its knots.
+
+    Attributes:
+        record: its name.
+        unit: as it is shown.
+        time: of the knots (n,). [s]
+        value, sd: at the knots, with their standard deviations (n,). [unit]
+    """
+
+    record: str
+    unit: str
+    time: tuple[float, ...]
+    value: tuple[float, ...]
+    sd: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Named:
     """A term of the best explanation.
 
@@ -59,6 +79,7 @@ class Named:
         estimates: its numbers.
         gain: on what was not fitted; None if that was not tried.
         against: why it is not named, though it is probable; ().
+        history: of an unknown input, in each record; () of another term.
     """
 
     id: str
@@ -68,6 +89,7 @@ class Named:
     estimates: tuple[Estimate, ...]
     gain: Gain | None = None
     against: tuple[str, ...] = ()
+    history: tuple[History, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -99,7 +121,7 @@ class Verdict:
     Attributes:
         verdict: one of the kinds.
         nearness: of the best explanation.
-        named: causes and errors in the data that are named.
+        named: causes, unknown inputs and errors in the data that are named.
         suspected: terms of the best explanation that are not named, with the reasons.
         explanations: ids of the terms → probability, the most probable first.
         relations: what all probable explanations have in common, in sentences.
@@ -127,7 +149,12 @@ class Verdict:
     @property
     def causes(self) -> tuple[Named, ...]:
         """Causes that are named."""
-        return tuple(each for each in self.named if not each.is_data_error)
+        return tuple(each for each in self.named if not each.is_data_error and not each.history)
+
+    @property
+    def unknown_inputs(self) -> tuple[Named, ...]:
+        """Unknown inputs that are named, with their histories."""
+        return tuple(each for each in self.named if each.history)
 
     @property
     def data_errors(self) -> tuple[Named, ...]:
@@ -169,13 +196,18 @@ class Verdict:
         return json.dumps(found, indent=2, allow_nan=False)
 
     def plot(self) -> Any:
-        """Return a figure: each channel of each record, measured and in free simulation, and the residual."""
+        """Return a figure: each channel of each record, measured and in free simulation, and the residual; below them
+        what unknown inputs were, with two standard deviations.
+        """
         import matplotlib.pyplot as plt
 
-        figure, axes = plt.subplots(
-            len(self.curves), 2, figsize=(11.0, 2.6 * len(self.curves)), squeeze=False, layout="constrained"
-        )
-        for (left, right), each in zip(axes, self.curves, strict=True):
+        histories = [(term, each) for term in (*self.named, *self.suspected) for each in term.history]
+        rows = len(self.curves) + len(histories)
+        figure, axes = plt.subplots(rows, 2, figsize=(11.0, 2.6 * rows), squeeze=False, layout="constrained")
+        for (left, right), (term, history) in zip(axes[len(self.curves) :], histories, strict=True):
+            _plot_history(left, term, history)
+            right.set_axis_off()
+        for (left, right), each in zip(axes, self.curves, strict=False):
             left.plot(each.time, each.measured, ".", color="0.6", markersize=2.5, label="measured, corrected")
             left.plot(each.time, each.nominal, "--", color="tab:blue", linewidth=1.0, label="nominal model")
             left.plot(each.time, each.best, color="tab:red", linewidth=1.2, label="best explanation, free")
@@ -190,6 +222,16 @@ class Verdict:
         axes[0][0].legend(fontsize="small")
         figure.suptitle(HEADLINES[self.verdict])
         return figure
+
+
+def _plot_history(axes: Any, term: Named, history: History) -> None:
+    value, wide = np.array(history.value), 2.0 * np.array(history.sd)
+    axes.fill_between(history.time, value - wide, value + wide, color="tab:red", alpha=0.25, linewidth=0.0)
+    axes.plot(history.time, value, color="tab:red", linewidth=1.2)
+    axes.axhline(0.0, color="0.5", linewidth=0.6)
+    axes.set_ylabel(f"{term.id.partition(':')[2]} [{history.unit or '-'}]")
+    axes.set_title(f"{history.record}: {term.sentence}", fontsize="small", loc="left")
+    axes.set_xlabel("time [s]")
 
 
 def curves_of(
@@ -231,6 +273,7 @@ def _named_lines(each: Named) -> list[str]:
         f"{each.sentence[:1].upper()}{each.sentence[1:]}: probability {shown_probability(each.probability)}"
     ]
     lines += [f"  {e.name} = {e.value:.4g} ± {e.sd:.2g} (nominal {e.nominal:.4g})" for e in each.estimates]
+    lines += [f"  {_history_shown(history)}" for history in each.history]
     if each.gain is not None:
         g = each.gain
         lines.append(
@@ -239,8 +282,25 @@ def _named_lines(each: Named) -> list[str]:
     return lines
 
 
+def _history_shown(history: History) -> str:
+    """Return where a history is largest, and its values at some of its knots."""
+    most = max(range(len(history.value)), key=lambda i: abs(history.value[i]))
+    step = max(-(-len(history.value) // KNOTS_SHOWN), 1)
+    some = ", ".join(f"{history.value[i]:.2g}" for i in range(0, len(history.value), step))
+    return (
+        f"{history.record}: largest at {history.time[most]:.4g} s, {history.value[most]:.3g} ± "
+        f"{history.sd[most]:.2g} {history.unit}".rstrip()
+        + f"; from {history.time[0]:.4g} s on every {step * (history.time[1] - history.time[0]):.3g} s: {some}"
+    )
+
+
 def _sizes_shown(each: Named) -> str:
-    sizes = ", ".join(f"{e.name} = {e.value:.4g} ± {e.sd:.2g}" for e in each.estimates)
+    sizes = ", ".join(
+        [
+            *(f"{e.name} = {e.value:.4g} ± {e.sd:.2g}" for e in each.estimates),
+            *(_history_shown(history) for history in each.history),
+        ]
+    )
     return f" ({sizes})" if sizes else ""
 
 
