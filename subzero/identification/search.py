@@ -19,6 +19,7 @@ from subzero.identification.candidates import declared, suggested
 from subzero.identification.explanation import CLOCK, Entry, Term, Terms, log_prior, with_term, without
 from subzero.identification.fit import (
     Fit,
+    Levels,
     Linear,
     fit,
     fitted_levels,
@@ -150,11 +151,11 @@ class Search:
         nominal = linearised(
             problem, (), entries, np.array([entry.centre for entry in entries]), levels, must=True
         )
-        self._fit(nominal)
         if (fitted := self.begin) is None:
             self._fit(self._greedy(nominal))
         else:
             self._fit(linearised(problem, fitted.terms, fitted.entries, fitted.x, fitted.linear.levels))
+        self._fit(nominal)
         for first in {key(each.terms): each for each in (self.fits[()], self.ranked()[0])}.values():
             self._fit_single_causes(first)
         while (base := self._next()) is not None:
@@ -210,7 +211,9 @@ class Search:
             bare = self.there(base.linear, without(base.terms, term))
             if bare and term not in gross:
                 # A fit that ended elsewhere may be far below what this one leaves when its term is dropped.
-                self._fit_additions(self._fit(bare, self._own_score(bare), again=True).linear)
+                rank = self._own_score(bare)
+                is_near = rank > self._best() - GROSS
+                self._fit_additions(self._fit(bare, rank, again=True).linear if is_near else bare)
             for twin in self._twins(term):
                 linear = self.there(base.linear, with_term(without(base.terms, term), twin))
                 if linear and self._own_score(linear) > self.score(base) - GROSS:
@@ -237,7 +240,8 @@ class Search:
         made = [self.there(bare, with_term(bare.terms, each)) for each in (*units, *other)]
         found = [self._with_own_noise(linear) for linear in made if linear]
         ranked = self._distinct(sorted(found, key=lambda pair: -pair[0]))[:FITTED]
-        return [self._fit(linear, score) for score, linear in ranked if score > self.score(base) - WITHIN]
+        near = (pair for pair in ranked if pair[0] > max(self.score(base) - WITHIN, self._best() - GROSS))
+        return [self._fit(linear, score) for score, linear in near]
 
     def _fit_additions(self, base: Linear) -> None:
         """Fit the best explanations with one term more, except those that are ranked far below the best of all fits.
@@ -273,21 +277,26 @@ class Search:
         name = key(start.terms)
         if name in self._tried and not (again and expected > self.score(self.fits[name]) + WORTH):
             return self.fits[name]
-        if self.fits and process_time() > self._end:
+        if () in self.fits and process_time() > self._end:
             raise _TimeOverError
         self._tried.add(name)
         words = " + ".join(term.id for term in start.terms) or "nothing is wrong"
         self.progress(min(0.9, 0.05 + 0.02 * len(self.fits)), f"fit of {words}")
-        fitted = fit(self.problem, start)
-        if self.score(fitted) < expected - WORTH:
+        far = self._best() - GROSS
+        least = far - log_prior(start.terms, self._loggers)
+        fitted = fit(self.problem, start, least)
+        if self.score(fitted) < expected - WORTH and expected > far:
             values = zip(start.entries, start.x.tolist(), strict=True)
             own = {entry: value for entry, value in values if entry.kind not in OF_MODEL}
             if nominal := starting_point(self.problem, start.terms, own):
-                fitted = max(fitted, fit(self.problem, nominal), key=self.score)
+                fitted = max(fitted, fit(self.problem, nominal, least), key=self.score)
         if name not in self.fits or fitted.log_evidence > self.fits[name].log_evidence:
             self.fits[name] = fitted
             self._left.discard(name)
         return self.fits[name]
+
+    def _best(self) -> float:
+        return max(map(self.score, self.fits.values()), default=-math.inf)
 
     def _greedy(self, nominal: Linear) -> Linear:
         """Return the nominal model with the units and regressions that gain most in the linear problem, one after the
@@ -325,8 +334,12 @@ class Search:
         """
         calm = [replace(each, levels=quieter(self.problem, each.terms, each.levels)) for _, each in ranked]
         quiet = sorted(((self._linear_score(each), each) for each in calm), key=lambda pair: -pair[0])
+        levels: dict[Key, Levels] = {}
         for order in (ranked, quiet):
-            yield from (linear for _, linear in self._distinct(order)[:RANKED_AGAIN])
+            for _, linear in self._distinct(order)[:RANKED_AGAIN]:
+                if levels.get(key(linear.terms)) != linear.levels:
+                    yield linear
+                levels.setdefault(key(linear.terms), linear.levels)
 
     def _distinct(self, ranked: Iterable[tuple[float, Linear]]) -> list[tuple[float, Linear]]:
         found: dict[Key, tuple[float, Linear]] = {}
