@@ -38,7 +38,8 @@ RANKED_AGAIN, FITTED = 10, 6
 WITHIN = 5.0
 """Explanations within this of the best are expanded, too. [nats]"""
 WORTH, GROSS = 3.0, 100.0
-"""A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one. [nats]"""
+"""A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one, and a fit that
+is so far below the best one is not brought to its end. [nats]"""
 GROSS_KINDS = ("unit", "affine", "swapped", "input", "exchanged", "stuck")
 """Errors in the data that may be gross, as those of all channels' clock and those that begin in mid-record may."""
 OF_MODEL = ("number", "start", "unknown")
@@ -272,7 +273,7 @@ class Search:
     def _fit(self, start: Linear, expected: float = -np.inf, *, again: bool = False) -> Fit:
         """Return the fit of an explanation from a start; also from the nominal model, if it is much less probable than
         expected of the linear problem: what another explanation moved may bar the way there. One that was fitted before
-        is fitted `again` only if much more is expected.
+        is fitted `again` only if much more is expected; one that is far below the best is not fitted to its end.
         """
         name = key(start.terms)
         if name in self._tried and not (again and expected > self.score(self.fits[name]) + WORTH):
@@ -296,6 +297,7 @@ class Search:
         return self.fits[name]
 
     def _best(self) -> float:
+        """Return the score of the best fit."""
         return max(map(self.score, self.fits.values()), default=-math.inf)
 
     def _greedy(self, nominal: Linear) -> Linear:
@@ -329,8 +331,8 @@ class Search:
         return found
 
     def _worth_own_noise(self, ranked: list[tuple[float, Linear]]) -> Iterator[Linear]:
-        """Yield the best, ranked with the noise of the explanation that they are added to, and ranked with usual noise,
-        from which their own is then sought: what a term would explain may be part of the former.
+        """Yield the best, ranked with the noise of the explanation that they are added to, and ranked with usual noise
+        where that is less, from which their own is then sought: what a term would explain may be part of the former.
         """
         calm = [replace(each, levels=quieter(self.problem, each.terms, each.levels)) for _, each in ranked]
         quiet = sorted(((self._linear_score(each), each) for each in calm), key=lambda pair: -pair[0])
