@@ -153,9 +153,10 @@ def _from_best_size(problem: Problem, linear: Linear, term: Term) -> Term:
     x = np.array([known.get(entry.identity, entry.centre) for entry in entries])
     sizes = np.linspace(-SIZES_TRIED, SIZES_TRIED, 16 * SIZES_TRIED + 1)
     sets = [np.where(np.arange(x.size) == place, size * entries[place].sd, x) for size in sizes]
-    found, _ = problem.residuals(terms, entries, sets)
+    names = list(problem.channels) if term.target == CLOCK else [term.target]
+    found, _ = problem.residuals(terms, entries, sets, names)
     levels, left = problem.levels(terms), np.zeros(sizes.size)
-    for name in problem.channels if term.target == CLOCK else [term.target]:
+    for name in names:
         left += np.mean((found[name][problem.used(name, terms)] / levels[name]) ** 2, axis=0)
     return replace(term, size=float(sizes[np.argmin(left)]))
 

@@ -10,7 +10,7 @@ level binds them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -24,6 +24,8 @@ from subzero.identification.problem import Problem
 
 SIZE_SPREAD = 1.0
 """Standard deviation of the logarithm of an unknown input's size about the declared one. [-]"""
+SHARES = (1.0, 0.5, 0.2, 0.05)
+"""A step is shortened to these, until it gains. [-]"""
 ROUNDS, STEPS = 20, 3
 """Sensitivities are computed at most so often; Gauss-Newton steps with each."""
 PATIENCE = 2
@@ -314,11 +316,12 @@ def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Le
         np.array([before.time, *(share * prior.interval for share in TIMES_TRIED)]) / before.time
     )
     begin = np.column_stack([np.zeros((lasting.size, 2)), lasting])
-    best = begin[int(np.argmin([negative(each) for each in begin]))]
+    tried = [negative(each) for each in begin]
+    best = begin[int(np.argmin(tried))]
     simplex = best + np.vstack([np.zeros(3), np.diag([0.3, -0.5, 0.7])])
     options = {"initial_simplex": simplex, "maxfev": 60, "xatol": 0.2, "fatol": ENOUGH}
     found = minimize(negative, best, method="Nelder-Mead", options=options)
-    better = found.fun <= negative(np.zeros(3))
+    better = found.fun <= tried[0]
     return replace(levels, noise={**levels.noise, name: at(found.x)}) if better else levels
 
 
@@ -377,14 +380,23 @@ class Fit:
         return dict(zip(self.entries, self.x.tolist(), strict=True))
 
 
-def fit(problem: Problem, start: Linear) -> Fit:
+def fit(problem: Problem, start: Linear, least: float = -np.inf) -> Fit:
     """Return the fit of an explanation from where it is linearised; sensitivities are computed anew where those of the
     start do not hold.
+
+    Args:
+        problem: records and model.
+        start: the explanation.
+        least: log evidence; a fit ends where the linear problem does not promise as much.
     """
-    linear = origin = _approached(problem, start)
+    linear, origin = _approached(problem, start)
     best, score, lasting = linear, -np.inf, 0
     for _ in range(ROUNDS):
-        linear = _stepped(problem, replace(linear, levels=fitted_levels(problem, linear)))
+        linear = replace(linear, levels=fitted_levels(problem, linear))
+        if linear.evidence(problem)[1] < least:
+            best = linear if score == -np.inf else best
+            break
+        linear = _stepped(problem, linear)
         if not _is_linear(problem, origin, linear):
             linear = origin = linearised(problem, linear.terms, linear.entries, linear.x, linear.levels)
         now = _laplace(problem, linear)[0]
@@ -471,12 +483,13 @@ def _left(problem: Problem, linear: Linear) -> dict[str, float]:
     }
 
 
-def _approached(problem: Problem, linear: Linear) -> Linear:
-    """Return a problem linearised nearer to the records, where it is far from them.
+def _approached(problem: Problem, linear: Linear) -> tuple[Linear, Linear]:
+    """Return a problem nearer to the records, where it is far from them, and where its sensitivities are those of.
 
     The noise is taken to be a share of the residual, so that a step remains where the linear problem holds; it shrinks
     with the residual (graduated optimisation).
     """
+    origin = linear
     for _ in range(ROUNDS):
         left = _left(problem, linear)
         tempered = {
@@ -484,14 +497,18 @@ def _approached(problem: Problem, linear: Linear) -> Linear:
             for name, each in linear.levels.noise.items()
         }
         if tempered == linear.levels.noise:
-            return linear
+            break
         there = _stepped(problem, replace(linear, levels=Levels(tempered, linear.levels.sizes)))
-        moved = linearised(problem, linear.terms, linear.entries, there.x, linear.levels)
-        now = _left(problem, moved)
-        if all(now[name] > (1.0 - APPROACHING) * left[name] for name in left):
-            return linear if sum(now.values()) > sum(left.values()) else moved
-        linear = moved
-    return linear
+        now = _left(problem, there)
+        ends = all(now[name] > (1.0 - APPROACHING) * left[name] for name in left)
+        if ends and sum(now.values()) > sum(left.values()):
+            break
+        linear = replace(there, levels=linear.levels)
+        if not _is_linear(problem, origin, there):
+            linear = origin = linearised(problem, linear.terms, linear.entries, linear.x, linear.levels)
+        if ends:
+            break
+    return linear, origin
 
 
 def linearised(
@@ -515,23 +532,23 @@ def _stepped(problem: Problem, linear: Linear) -> Linear:
     cost = _negative_log_posterior(problem, at)
     for _ in range(STEPS):
         step = at.evidence(problem)[0]
-        sets = [np.clip(at.x + share * step, *low_high) for share in (1.0, 0.5, 0.2, 0.05)]
-        taken = None
-        for x in sets:
-            e, valid = problem.residuals(at.terms, at.entries, [x])
-            if not valid[0]:
-                continue
-            there = replace(at, x=x, e={name: column[:, 0] for name, column in e.items()})
-            new = _negative_log_posterior(problem, there)
-            if new < cost:
-                taken = (there, new)
-                break
+        sets = [np.clip(at.x + share * step, *low_high) for share in SHARES]
+        costs = ((there, _negative_log_posterior(problem, there)) for there in _moved(problem, at, sets))
+        taken = next(((there, new) for there, new in costs if new < cost), None)
         if taken is None:
             return at
         gained, (at, cost) = cost - taken[1], taken
         if gained < ENOUGH:
             return at
     return at
+
+
+def _moved(problem: Problem, linear: Linear, sets: Sequence[np.ndarray]) -> Iterator[Linear]:
+    """Yield a problem at other points that can be simulated; simulated together where the model takes many sets."""
+    for some in [sets] if problem.model.batch else [[x] for x in sets]:
+        e, valid = problem.residuals(linear.terms, linear.entries, some)
+        for j in np.flatnonzero(valid).tolist():
+            yield replace(linear, x=some[j], e={name: columns[:, j] for name, columns in e.items()})
 
 
 def _negative_log_posterior(problem: Problem, linear: Linear) -> float:

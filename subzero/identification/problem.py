@@ -339,14 +339,22 @@ class Problem:
         return {name: value for name, value in self.model.nominal().items() if not isinstance(value, dict)}
 
     def residuals(
-        self, terms: Terms, entries: Sequence[Entry], sets: Sequence[np.ndarray], *, must: bool = False
+        self,
+        terms: Terms,
+        entries: Sequence[Entry],
+        sets: Sequence[np.ndarray],
+        channels: Sequence[str] | None = None,
+        *,
+        must: bool = False,
     ) -> tuple[dict[str, np.ndarray], np.ndarray]:
-        """Return channel → residuals (m, k) of k sets of entries, and which sets could be simulated (k,)."""
+        """Return channel → residuals (m, k) of k sets of entries, of some channels or of all, and which sets could be
+        simulated (k,).
+        """
         runs = [self._readings_of(k, terms, entries, sets, must=must) for k in range(len(self.records))]
         valid = np.array([all(of[j] is not None for of in runs) for j in range(len(sets))])
         found = {}
-        for name, each in self.channels.items():
-            columns = np.full((each.values.size, len(sets)), np.nan)
+        for name in self.channels if channels is None else channels:
+            columns = np.full((self.channels[name].values.size, len(sets)), np.nan)
             recorded, sensor = self.recorded(name, terms), self.model.channels[name]
             for j in np.flatnonzero(valid).tolist():
                 simulated = self._simulated(name, [of[j] or {} for of in runs], entries, sets[j])

@@ -31,6 +31,7 @@ from subzero.identification.explanation import (
 )
 from subzero.identification.fit import (
     Fit,
+    Levels,
     Linear,
     fit,
     fitted_levels,
@@ -51,7 +52,8 @@ RANKED_AGAIN, FITTED = 10, 6
 WITHIN = 5.0
 """Explanations within this of the best are expanded, too. [nats]"""
 WORTH, GROSS = 3.0, 100.0
-"""A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one. [nats]"""
+"""A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one, and a fit that
+is so far below the best one is not brought to its end. [nats]"""
 GROSS_KINDS = ("unit", "affine", "swapped", "input", "exchanged", "stuck")
 """Errors in the data that may be gross, as those of all channels' clock and those that begin in mid-record may."""
 OF_MODEL = ("number", "start", "unknown")
@@ -176,11 +178,11 @@ class Search:
 
     def _run(self) -> None:
         problem, nominal = self.problem, self._nominal()
-        self._fit(nominal)
         if (fitted := self.begin) is None:
             self._fit(self._greedy(nominal))
         else:
             self._fit(linearised(problem, fitted.terms, fitted.entries, fitted.x, fitted.linear.levels))
+        self._fit(nominal)
         for first in {key(each.terms): each for each in (self.fits[()], self.ranked()[0])}.values():
             self._fit_single_causes(first)
         while (base := self._next()) is not None or self._fit_unknown():
@@ -295,7 +297,9 @@ class Search:
             bare = self.there(base.linear, without(base.terms, term))
             if bare and term not in gross:
                 # A fit that ended elsewhere may be far below what this one leaves when its term is dropped.
-                self._fit_additions(self._fit(bare, self._own_score(bare), again=True).linear)
+                rank = self._own_score(bare)
+                is_near = rank > self._best() - GROSS
+                self._fit_additions(self._fit(bare, rank, again=True).linear if is_near else bare)
             for twin in self._twins(term):
                 linear = self.there(base.linear, with_term(without(base.terms, term), twin))
                 if linear and self._own_score(linear) > self.score(base) - GROSS:
@@ -322,7 +326,8 @@ class Search:
         made = [self.there(bare, with_term(bare.terms, each)) for each in (*units, *other)]
         found = [self._with_own_noise(linear) for linear in made if linear]
         ranked = self._distinct(sorted(found, key=lambda pair: -pair[0]))[:FITTED]
-        return [self._fit(linear, score) for score, linear in ranked if score > self.score(base) - WITHIN]
+        near = (pair for pair in ranked if pair[0] > max(self.score(base) - WITHIN, self._best() - GROSS))
+        return [self._fit(linear, score) for score, linear in near]
 
     def _fit_additions(self, base: Linear) -> None:
         """Fit the best explanations with one term more, except those that are ranked far below the best of all fits.
@@ -357,26 +362,32 @@ class Search:
     def _fit(self, start: Linear, expected: float = -np.inf, *, again: bool = False) -> Fit:
         """Return the fit of an explanation from a start; also from the nominal model, if it is much less probable than
         expected of the linear problem: what another explanation moved may bar the way there. One that was fitted before
-        is fitted `again` only if much more is expected.
+        is fitted `again` only if much more is expected; one that is far below the best is not fitted to its end.
         """
         name = key(start.terms)
         if name in self._tried and not (again and expected > self.score(self.fits[name]) + WORTH):
             return self.fits[name]
-        if self.fits and process_time() > self._end:
+        if () in self.fits and process_time() > self._end:
             raise _TimeOverError
         self._tried.add(name)
         words = " + ".join(term.id for term in start.terms) or "nothing is wrong"
         self.progress(min(0.9, 0.05 + 0.02 * len(self.fits)), f"fit of {words}")
-        fitted = fit(self.problem, start)
-        if self.score(fitted) < expected - WORTH:
+        far = self._best() - GROSS
+        least = far - log_prior(start.terms, self._loggers)
+        fitted = fit(self.problem, start, least)
+        if self.score(fitted) < expected - WORTH and expected > far:
             values = zip(start.entries, start.x.tolist(), strict=True)
             own = {entry: value for entry, value in values if entry.kind not in OF_MODEL}
             if nominal := starting_point(self.problem, start.terms, own):
-                fitted = max(fitted, fit(self.problem, nominal), key=self.score)
+                fitted = max(fitted, fit(self.problem, nominal, least), key=self.score)
         if name not in self.fits or fitted.log_evidence > self.fits[name].log_evidence:
             self.fits[name] = fitted
             self._left.discard(name)
         return self.fits[name]
+
+    def _best(self) -> float:
+        """Return the score of the best fit."""
+        return max(map(self.score, self.fits.values()), default=-math.inf)
 
     def _greedy(self, nominal: Linear) -> Linear:
         """Return the nominal model with the units and regressions that gain most in the linear problem, one after the
@@ -409,13 +420,17 @@ class Search:
         return found
 
     def _worth_own_noise(self, ranked: list[tuple[float, Linear]]) -> Iterator[Linear]:
-        """Yield the best, ranked with the noise of the explanation that they are added to, and ranked with usual noise,
-        from which their own is then sought: what a term would explain may be part of the former.
+        """Yield the best, ranked with the noise of the explanation that they are added to, and ranked with usual noise
+        where that is less, from which their own is then sought: what a term would explain may be part of the former.
         """
         calm = [replace(each, levels=quieter(self.problem, each.terms, each.levels)) for _, each in ranked]
         quiet = sorted(((self._linear_score(each), each) for each in calm), key=lambda pair: -pair[0])
+        levels: dict[Key, Levels] = {}
         for order in (ranked, quiet):
-            yield from (linear for _, linear in self._distinct(order)[:RANKED_AGAIN])
+            for _, linear in self._distinct(order)[:RANKED_AGAIN]:
+                if levels.get(key(linear.terms)) != linear.levels:
+                    yield linear
+                levels.setdefault(key(linear.terms), linear.levels)
 
     def _distinct(self, ranked: Iterable[tuple[float, Linear]]) -> list[tuple[float, Linear]]:
         found: dict[Key, tuple[float, Linear]] = {}

@@ -319,3 +319,28 @@ def test_numbers_that_trade_off_exactly_keep_their_prior_along_the_ridge():
     found = fit(problem, linearised(problem, (), entries, np.ones(2), levels))
     (place,) = [i for i, entry in enumerate(entries) if entry.name == "a"]
     assert np.sqrt(found.variance[place]) == pytest.approx(tau * np.sqrt(1.0 - 4.0 / 5.0), rel=0.2)
+
+
+def test_a_fit_of_which_the_linear_problem_promises_too_little_is_ended():
+    """A spring that is stiffer than the model says needs steps, and simulations; an ended fit takes none."""
+    problem = Problem(model(), [record(0, k=4.1)])
+    entries = problem.entries(())
+    centre = np.array([entry.centre for entry in entries])
+    start = linearised(problem, (), entries, centre, usual_levels(problem, ()))
+    whole = fit(problem, start)
+    before = problem.runs[0].count
+    ended = fit(problem, start, least=whole.log_evidence + 100.0)
+    assert problem.runs[0].count == before
+    assert ended.log_evidence < whole.log_evidence
+    assert fit(problem, start, least=whole.log_evidence - 100.0).log_evidence == whole.log_evidence
+
+
+def test_a_step_is_shortened_alike_where_a_model_takes_many_sets_at_once():
+    """Of a spring that is far stiffer than the model says, with batches and set by set. Tolerance: of rounding."""
+    fits = []
+    for batch in (True, False):
+        problem = Problem(model(batch=batch, unknown=False), [record(0, k=4.4)])
+        entries, levels = problem.entries(()), usual_levels(problem, ())
+        fits.append(fit(problem, linearised(problem, (), entries, np.array([4.0, 0.3, 1.0]), levels)))
+    assert fits[0].x == pytest.approx(fits[1].x, rel=1e-6)
+    assert fits[0].log_evidence == pytest.approx(fits[1].log_evidence, abs=0.01)
