@@ -98,8 +98,10 @@ def _searched(
     """
     count: dict[str, int] = {}
     best: Fit | None = None
+    problem: Problem | None = None
     for last in range(PASSES):
-        search = Search(Problem(model, records), report, end - process_time(), best)
+        problem = Problem(model, records, before=problem)
+        search = Search(problem, report, end - process_time(), best)
         search.run()
         best = search.ranked()[0]
         outliers = search.problem.outliers(best.terms, best.linear.e)
