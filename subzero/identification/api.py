@@ -126,8 +126,10 @@ def _searched(
     """
     count: dict[str, int] = {}
     best: Fit | None = None
+    problem: Problem | None = None
     for last in range(PASSES):
-        search = Search(Problem(model, records), report, end - process_time(), best)
+        problem = Problem(model, records, before=problem)
+        search = Search(problem, report, end - process_time(), best)
         search.screen() if screen else search.run()
         best = search.ranked()[0]
         outliers = search.problem.outliers(best.terms, best.linear.e)

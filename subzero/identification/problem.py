@@ -81,6 +81,7 @@ class Problem:
         model: of the records.
         records: one or more.
         fixed: numbers that a fit may not move: identity of an entry → value.
+        before: a problem of the same model; where its records have the same inputs, its runs are used.
 
     Raises:
         UserError: a record has no channel or not all inputs of the model.
@@ -92,13 +93,16 @@ class Problem:
         model: Model,
         records: Sequence[Record],
         fixed: Mapping[tuple[str, str, int, int], float] = MappingProxyType({}),
+        before: Problem | None = None,
     ) -> None:
         self.model, self.records, self.fixed = model, list(records), fixed
         if not self.records:
             raise UserError("there is no record. Give one, or several.")
         self.inputs = [{name: _input(record, name) for name in model.inputs} for record in self.records]
-        self.runs = [
-            Runs(model, record.time, inputs, record.name)
+        known: list[Runs] = before.runs if before else []
+        self.runs: list[Runs] = [
+            next((run for run in known if run.serves(record.time, inputs)), None)
+            or Runs(model, record.time, inputs, record.name)
             for record, inputs in zip(self.records, self.inputs, strict=True)
         ]
         self.channels = {
@@ -112,6 +116,8 @@ class Problem:
             )
         empty = self.entries(())
         for k, run in enumerate(self.runs):
+            if run in known:
+                continue
             own = [entry for entry in empty if _moves(entry, k)]
             run.check(self._asked(k, own, np.array([entry.centre for entry in own])))
 

@@ -44,6 +44,7 @@ from subzero.identification.fit import (
 )
 from subzero.identification.nearness import follows
 from subzero.identification.problem import Problem, Progress
+from subzero.identification.sensitivities import Sensitivities
 
 MOST_TERMS = 8
 """An explanation has no more terms."""
@@ -131,6 +132,7 @@ class Search:
         self._tried: set[Key] = set()
         self._added: dict[int, tuple[Linear, list[tuple[float, Linear]]]] = {}
         self._offered: set[Key] = set()
+        self._sensitivities = Sensitivities(self.problem)
         self._terms, self._unknown = declared(self.problem), unknown_terms(self.problem.model)
         # Offsets are among them for those that begin in mid-record.
         self._gross = [term for term in self._terms if term.kind == "offset" or _is_gross_kind(term)]
@@ -473,7 +475,8 @@ class Search:
         found, valid = problem.residuals(terms, entries, [x])
         if not valid[0]:
             return None
-        own = self.problem.jacobian(terms, entries, x, fresh) if fresh else {}
+        e = {name: column[:, 0] for name, column in found.items()}
+        own = self._sensitivities.of(terms, entries, x, fresh, e) if fresh else {}
         J = {}
         for name, before in base.J.items():
             J[name] = np.empty((before.shape[0], len(entries)))
@@ -481,7 +484,7 @@ class Search:
             if fresh:
                 J[name][:, fresh] = own[name]
         levels = levels_under(problem, terms, base)
-        return Linear(terms, entries, x, {name: e[:, 0] for name, e in found.items()}, J, levels)
+        return Linear(terms, entries, x, e, J, levels)
 
 
 def _begin(entry: Entry, term: Term | None) -> float:

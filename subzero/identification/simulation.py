@@ -42,6 +42,11 @@ class Runs:
         self.count = 0
         self._kept: OrderedDict[tuple[Any, ...], dict[str, np.ndarray] | None] = OrderedDict()
 
+    def serves(self, time: np.ndarray, inputs: Mapping[str, np.ndarray]) -> bool:
+        """Return whether these are runs with some inputs at some times (n,)."""
+        same = [np.array_equal(values, self.inputs[name]) for name, values in inputs.items()]
+        return np.array_equal(time, self.time) and all(same)
+
     def readings(self, asked: Sequence[Asked], *, must: bool = False) -> list[dict[str, np.ndarray] | None]:
         """Return channel → readings (n,) of each run; None of one that failed.
 
