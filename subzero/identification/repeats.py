@@ -88,6 +88,8 @@ def _moves(
     away = [np.abs(line - values[run.first]).max() for run, line in zip(runs, lines, strict=True)]
     moved = [np.ptp(simulated[run.first : run.last + 1]) for run in runs]
     rounding = FAR * prior.resolution / np.sqrt(12.0)
+    # A vehicle begins at rest, and sensors have dead bands.
+    moved = [size / FAR if run.first == at[0] else size for run, size in zip(runs, moved, strict=True)]
     return bool(
         np.linalg.norm(moved) > np.hypot(prior.level, rounding)
         or max(away) > FAR * np.hypot(prior.level, rounding)

@@ -168,8 +168,11 @@ class Search:
             self.complete = False
 
     def screen(self) -> None:
-        """Rank all single terms in the linear problem around the fit of "nothing is wrong"."""
-        self._best_additions(self._fit(self._nominal()).linear)
+        """Fit gross errors in the data alone, and rank one term more in the linear problem."""
+        nominal = self._nominal()
+        self._fit(self._greedy(nominal))
+        self._fit(nominal)
+        self._best_additions(self.ranked()[0].linear)
         self.complete = False
 
     def _nominal(self) -> Linear:

@@ -35,7 +35,7 @@ EACH = (
     DataError(kind="reference", channels=("heading",), how="is 90 degrees too large"),
     DataError(kind="reference", channels=("heading",), how="counts counter-clockwise from east"),
     DataError(kind="affine", channels=("depth",), amount=0.4, scale=1.7),
-    DataError(kind="command_unit", channels=("propeller_command",), scale=60.0),
+    DataError(kind="command_unit", channels=("propeller_command",), scale=2.0),
     DataError(kind="step", channels=("pitch",), amount=3.0, since=12.0),
     DataError(kind="frozen", channels=("roll_angle",), since=20.0, at=tuple(np.arange(20.0, 60.0, 0.1))),
     DataError(kind="dropout", channels=("roll_angle",), how="-999", at=tuple(TIME[50:60])),
@@ -88,7 +88,7 @@ def test_a_correction_undoes_its_error(error):
 
 def test_what_a_record_repeats_is_taken_off_at_the_times_that_were_written():
     clean = smooth()
-    late, frozen = EACH[11], EACH[7]
+    late, frozen = (next(error for error in EACH if error.kind == kind) for kind in ("late_clock", "frozen"))
     for order in ((late, frozen), (frozen, late)):
         values = corrected(clean, order).record.values["roll_angle"]
         assert np.isfinite(values).sum() == 160  # 20 s of which the first 4 are before the trial

@@ -86,15 +86,6 @@ def test_no_run_is_made_twice_and_sensors_need_none(plant):
     assert problem.kept.made == 2, "another drag is another run"
 
 
-def test_runs_for_a_record_put_right_serve_for_it_as_it_was(plant):
-    problem = dataclasses.replace(plant(duration=6.0).problem, kept=Counting())
-    right = dataclasses.replace(problem, kept=problem.kept.again())
-    z = np.zeros(len(problem.entries))
-    assert np.array_equal(right.residual(z), problem.residual(z))
-    assert problem.kept.made == 0, "it was made for the record put right"
-    assert (right.kept.asked, problem.kept.asked) == (1, 1), "each search counts what it asks for"
-
-
 def test_runs_of_another_setting_are_others(plant):
     """The same deviations from another nominal model: identities must not be mistaken."""
     problem = plant(duration=6.0).problem
