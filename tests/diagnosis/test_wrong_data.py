@@ -1,8 +1,9 @@
 """Errors in the data that something else nearly explains: they are told as what they are, at the public face.
 
-Verifies: the step of a rounded sensor is read off all that it has shown; records of the benchmark whose error a fin, another channel or another clock came close to. Configuration: short zigzags and dives of a
-healthy vehicle by the other formulation of the cable; seeds 7401 and 71125 of `benchmarks.diagnosis.data_errors`.
-Tolerance: numbers as in that benchmark (`is_right`).
+Verifies: the step of a rounded sensor is read off all that it has shown; records of the benchmark whose error a fin,
+another channel or another clock came close to. Configuration: short zigzags of a healthy vehicle by the other
+formulation of the cable; seeds 7401 and 71125 of `benchmarks.diagnosis.data_errors`. Tolerance: numbers as in that
+benchmark (`is_right`).
 """
 
 import dataclasses
