@@ -43,6 +43,8 @@ INVISIBLE = 1e-3
 SIZE_RANGE = (-5.0, 6.0)
 """Sizes of unknown inputs that are looked at, as logarithms of their ratio to the declared one. [-]"""
 
+QUICK = 0.2
+"""Slow noise that changes in a smaller share of an unknown input's time is not its doing. [-]"""
 NO_SIZES: Mapping[str, float] = MappingProxyType({})
 """Unknown inputs have their declared sizes."""
 
@@ -71,12 +73,15 @@ def taken(problem: Problem, fitted: Fit) -> float:
 
         ½ log|C| − ½ log|C usual| + log prior(usual) − log prior,   C = Σ + J D Jᵀ
 
-    White noise is that of the fit in both: what has a history is no white noise. A sensor that has less of it than it
-    may have is a slow one.
+    White noise is that of the fit in both, and so is what changes much more quickly than the inputs that are offered. A
+    sensor that has less white noise than it may have is a slow one.
     """
     linear = fitted.linear
+    quick = QUICK * min(each.time for each in problem.model.offered)
     noise = {
         name: replace(each, slow=min(each.slow, _usual_slow(problem.prior(name, fitted.terms), each)))
+        if each.time > quick
+        else each
         for name, each in linear.levels.noise.items()
     }
     calm = Levels(noise, {name: min(size, 1.0) for name, size in linear.levels.sizes.items()})
