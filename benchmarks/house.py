@@ -63,7 +63,7 @@ BUDGETS = {
     "command line and what it writes": (r"subzero\.(cli|write_|voice$|progress$|__main__$)", 1900),
     "explore": (r"subzero\.explore|.*\.local_access$", 600),
     "figures": (r"subzero\.figures\b|.*\.accessor$", 1300),
-    "diagnosis": (r"subzero\.diagnosis\b", 12000),
+    "diagnosis": (r"subzero\.(diagnosis|identification)\b", 12000),
     "calibration": (r"subzero\.calibration\b", 1100),
     "autopilot": (r"subzero\.autopilot\b|.*\.gym_environment$", 2800),
     "import of logs": (r"subzero\.logs\b", 1200),
@@ -385,19 +385,17 @@ def _commented(some: list[Module]) -> float:
     return 100.0 * sum(module.comments for module in some) / max(lines, 1)
 
 
-ENGINE = r"subzero\.diagnosis\b(?!\.hypothesis\.catalogue|\.report|\.vehicle_model)"
-"""Modules of the diagnosis without those that are words, tables, or serve another engine."""
+ENGINE = r"subzero\.diagnosis\b(?!\.hypothesis\.catalogue|\.report)"
+"""Modules of the diagnosis without those that are words or tables."""
 
 
 def engine_goals(every: dict[str, Module]) -> list[Goal]:
-    """Return what is asked of the engine of a diagnosis: files, settings of the search, and floors of classes."""
+    """Return what is asked of the engine of a diagnosis: files, and floors of classes."""
     inside = {name: module for name, module in every.items() if re.match(ENGINE, name)}
-    settings = constants.named(inside["subzero.diagnosis.inference.settings"].tree)
     classes = [node for m in inside.values() for node in ast.walk(m.tree) if isinstance(node, ast.ClassDef)]
     depth = longest_chain({node.name: {ast.unparse(base) for base in node.bases} for node in classes})
     return [
         Goal(name="diagnosis: files of its engine", found=len(inside), most=45),
-        Goal(name="diagnosis: settings of its search", found=len(settings), most=30),
         Goal(name="diagnosis: classes below one another", found=len(depth) - 1, most=1, places=tuple(depth)),
     ]
 

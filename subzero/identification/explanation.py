@@ -235,7 +235,7 @@ def cause_terms(model: Model, durations: Sequence[float]) -> list[Term]:
 
 
 def unknown_terms(model: Model) -> list[Term]:
-    """Return a term of every input that is 0 in a healthy model, and may act as nobody knows."""
+    """Return a term of every input that is 0 in a healthy model, and may act all the same."""
     odds = PRIOR_UNKNOWN / max(len(model.offered), 1)
     return [
         Term(

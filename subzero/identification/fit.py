@@ -97,7 +97,7 @@ def taken(problem: Problem, fitted: Fit) -> float:
 
 
 def _usual_slow(prior: NoisePrior, noise: Noise) -> float:
-    """Return how much slow noise is usual beside the white noise of a fit: a share of the level; or, where white noise
+    """Return how much slow noise is usual with the white noise of a fit: a share of the level; or, where white noise
     is below the lower end of the level, what the level leaves, half way to its upper end. [unit of the channel]
     """
     if noise.white > prior.least:
@@ -392,7 +392,7 @@ def fit(problem: Problem, start: Linear, least: float = -np.inf) -> Fit:
     Args:
         problem: records and model.
         start: the explanation.
-        least: log evidence; a fit ends where the linear problem does not promise as much.
+        least: log evidence; a fit ends where the linear problem predicts less.
     """
     linear, origin = _approached(problem, start)
     best, score, lasting = linear, -np.inf, 0

@@ -106,11 +106,11 @@ def _late_commands(problem: Problem, term: Term) -> list[str]:
 
 
 class Fold(NamedTuple):
-    """Records that are fitted, records that are predicted, the time from which predictions count [s], and what these
-    are: records that were held out, if it is strict.
+    """Records that are fitted, records that are predicted, the time from which predictions count [s], and their name:
+    records that were held out, if it is strict.
 
-    Starts and histories of the predicted records are those of what is seen of them: all, or what gaps leave, and then
-    only what is not seen counts.
+    Starts and histories of the predicted records are fitted to the readings that are seen: all, or those that gaps
+    leave, and then only the others count.
     """
 
     fitted: Problem

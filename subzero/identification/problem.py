@@ -40,7 +40,7 @@ FREE_TURNS = 2.0
 FOLLOWS = 0.25
 """Residuals of an angle that change by less between neighbours, in turns, are followed beyond half a turn. [-]"""
 SAME_JUMP, ALONE = 0.25, 4.0
-"""Steps of an angle within this share of a turn are turns of its logger; one stands alone if those beside it are so
+"""Steps of an angle within this share of a turn are turns of its logger; one stands alone if its neighbours are so
 many times smaller. [-]"""
 MAX_KNOTS = 200
 """Most knots of one unknown input in one record: its time is lengthened where there would be more."""

@@ -1,7 +1,7 @@
 """Readings that repeat a value: a sensor that is stuck, or a logger that writes a value where it has no measurement.
 
 Neighbours are equal by chance where a sensor rounds. In n readings of which a share q equal the one before,
-n q^(L−1) runs of L equal ones are expected: longer ones are no chance, if what is measured moves meanwhile.
+n q^(L−1) runs of L equal ones are expected: longer ones are no chance, if the simulation moves meanwhile.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ def _is_saturated(problem: Problem, name: str, values: np.ndarray, run: Run) -> 
 def _moves(
     problem: Problem, name: str, terms: Terms, runs: list[Run], at: np.ndarray, simulated: np.ndarray
 ) -> bool:
-    """Return whether what is measured moves during runs of equal readings, together: the simulation does, or the line
+    """Return whether the true value moves during runs of equal readings, together: the simulation does, or the line
     through the readings on both sides, of those at some places (n,), is away from the value.
     """
     values, prior = problem.recorded(name, terms), problem.prior(name, terms)

@@ -88,6 +88,11 @@ def _is_gross_kind(term: Term) -> bool:
     return term.kind in GROSS_KINDS or term.target == CLOCK or begins
 
 
+def _changes_with_time(term: Term) -> bool:
+    """Return whether a term acts in a part of a record, or more and more, as an unknown input may."""
+    return term.kind == "drift" or math.isfinite(term.begins)
+
+
 def _new(base: Linear, linear: Linear) -> Term:
     """Return the term that one explanation has and another has not."""
     have = {term.id for term in base.terms}
@@ -206,7 +211,8 @@ class Search:
         if not self._unknown:
             return False
         self._fit_unknown_with(best)
-        doubtful = not follows(self.problem, best) or len(self._causes_of(best)) > 1
+        own = self._causes_of(best)
+        doubtful = not follows(self.problem, best) or len(own) > 1 or any(map(_changes_with_time, own))
         if len(self.fits) > before or doubtful:
             self._fit_unknown_with(self._without_causes(best))
             self._fit_unknown_with(self.fits[()])

@@ -14,17 +14,20 @@ from numpy.testing import assert_allclose
 
 import subzero
 from benchmarks.diagnosis import world
-from subzero.diagnosis.hypothesis.noise import (
+from subzero.diagnosis.inference import (
     CorrelationTimes,
+    Noise,
+    Observed,
+    ResidualNoise,
     SensorPrior,
     correlation_times_of,
+    estimate,
     log_density,
+    log_marginal,
     prior_of,
     resolution_of,
     spikes,
 )
-from subzero.diagnosis.hypothesis.noise_estimate import ResidualNoise, estimate, log_marginal
-from subzero.diagnosis.inference import Noise, Observed
 
 LEVEL = 0.3
 RECORDS = 24

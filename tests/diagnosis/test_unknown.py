@@ -23,9 +23,9 @@ from subzero.diagnosis.inference import (
     force_columns,
     history,
     knots_of,
+    log_gains,
     without_force,
 )
-from subzero.diagnosis.inference.linear_gaussian import log_gains
 from subzero.diagnosis.report import summary
 from subzero.records.record import Record
 from subzero.synthetic.planted import draw_tolerances, make_record

@@ -14,8 +14,8 @@ a force or a drift over time, and shapes of a formula     latent_force
 its history                                               input_estimation
 a formula for a latent force                              force_formula
 
-Which explanations are probable is the subject of `subzero.identification`; here is what is computed of those that are
-reported, and what a calibration fits.
+Which explanations are probable is the subject of `subzero.identification`; here stands the fit of those that are
+reported, and of a calibration.
 
 `__all__` lists the public names; everything else is internal (a contract in ``pyproject.toml`` enforces this for code
 outside the diagnosis).
@@ -30,7 +30,16 @@ from subzero.diagnosis.hypothesis.hypotheses import (
     variances,
     with_tolerances,
 )
-from subzero.diagnosis.hypothesis.noise import Noise, SensorPrior, resolution_of, spikes
+from subzero.diagnosis.hypothesis.noise import (
+    CorrelationTimes,
+    Noise,
+    SensorPrior,
+    correlation_times_of,
+    log_density,
+    prior_of,
+    resolution_of,
+    spikes,
+)
 from subzero.diagnosis.hypothesis.noise_estimate import ResidualNoise, estimate, log_marginal
 from subzero.diagnosis.hypothesis.configuration import TRUTHS
 from subzero.diagnosis.inference.simulator import (
@@ -42,7 +51,13 @@ from subzero.diagnosis.inference.simulator import (
     with_stops,
 )
 from subzero.diagnosis.inference.problem import Observed, Problem, Progress
-from subzero.diagnosis.inference.linear_gaussian import ForceInformation, Quadratic, posterior, seen
+from subzero.diagnosis.inference.linear_gaussian import (
+    ForceInformation,
+    Quadratic,
+    log_gains,
+    posterior,
+    seen,
+)
 from subzero.diagnosis.inference.map_fit import (
     Fit,
     bounded_step,
@@ -84,6 +99,7 @@ __all__ = [
     "AXIS_WORDS",
     "MAX_DRIFT_LEVELS",
     "TRUTHS",
+    "CorrelationTimes",
     "EstimatedForce",
     "Fit",
     "ForceInformation",
@@ -101,6 +117,7 @@ __all__ = [
     "bounds",
     "broyden_update",
     "columns_of",
+    "correlation_times_of",
     "describe",
     "economical",
     "entries_of",
@@ -112,11 +129,14 @@ __all__ = [
     "history",
     "is_noise",
     "knots_of",
+    "log_density",
+    "log_gains",
     "log_marginal",
     "moves_nothing",
     "objective",
     "pose",
     "posterior",
+    "prior_of",
     "quadratic_step",
     "refit",
     "resolution_of",

@@ -90,7 +90,7 @@ class FollowUp:
     """Results that need simulations after the search.
 
     Attributes:
-        extended: the model with what is named.
+        extended: the model with the named causes.
         unknown: the latent force or drift.
         gain: of the extended model on held-out data.
         next_trial: recommended next trial.
@@ -119,7 +119,7 @@ def follow_up(asked: Asked, report: Report) -> FollowUp:
 
 
 def _extension(report: Report) -> tuple[Fitted, Unknown | None, Extended]:
-    """Return the fit of the model with what is named, the unknown force or drift, and the model."""
+    """Return the fit of the extended model, the unknown force or drift, and the model."""
     if report.on_model == OUTSIDE:
         return _of_unknown(report)
     if report.on_model == CAUSE_NAMED:
