@@ -373,7 +373,8 @@ class Search:
     def _fit(self, start: Linear, expected: float = -np.inf, *, again: bool = False) -> Fit:
         """Return the fit of an explanation from a start; also from the nominal model, if it is much less probable than
         expected of the linear problem: what another explanation moved may bar the way there. One that was fitted before
-        is fitted `again` only if much more is expected; one that is far below the best is not fitted to its end.
+        is fitted `again` only if much more is expected. No fit goes on that is far below the best one, or below another
+        of the same explanation.
         """
         name = key(start.terms)
         if name in self._tried and not (again and expected > self.score(self.fits[name]) + WORTH):
@@ -384,13 +385,15 @@ class Search:
         words = " + ".join(term.id for term in start.terms) or "nothing is wrong"
         self.progress(min(0.9, 0.05 + 0.02 * len(self.fits)), f"fit of {words}")
         far = self._best() - GROSS
-        least = far - log_prior(start.terms, self._loggers)
+        known = self.fits[name].log_evidence if name in self.fits else -math.inf
+        least = max(far - log_prior(start.terms, self._loggers), known)
         fitted = fit(self.problem, start, least)
         if self.score(fitted) < expected - WORTH and expected > far:
             values = zip(start.entries, start.x.tolist(), strict=True)
             own = {entry: value for entry, value in values if entry.kind not in OF_MODEL}
             if nominal := starting_point(self.problem, start.terms, own):
-                fitted = max(fitted, fit(self.problem, nominal, least), key=self.score)
+                second = fit(self.problem, nominal, max(least, fitted.log_evidence))
+                fitted = max(fitted, second, key=self.score)
         if name not in self.fits or fitted.log_evidence > self.fits[name].log_evidence:
             self.fits[name] = fitted
             self._left.discard(name)
