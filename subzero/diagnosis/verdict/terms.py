@@ -46,11 +46,11 @@ class Size:
 
 
 def sizes(fit: Fit) -> dict[tuple[str, str], Size]:
-    """Return (kind, name) of an entry that all records share → its size."""
+    """Return (kind, name) of an entry that belongs to a term, or to a sensor → its size."""
     return {
         (entry.kind, entry.name): Size(value, math.sqrt(variance))
         for entry, value, variance in zip(fit.entries, fit.x.tolist(), fit.variance.tolist(), strict=True)
-        if entry.record < 0
+        if entry.kind not in ("start", "unknown")
     }
 
 
