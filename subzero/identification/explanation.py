@@ -18,6 +18,7 @@ sentence.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
@@ -52,37 +53,39 @@ ONSET_ODDS = 0.2
 ONSET_SHARES = tuple(np.arange(0.1, 0.95, 0.1).tolist())
 """Where a search for an onset begins, over the duration of a record. [-]"""
 
-KNOWN: tuple[tuple[float, float, str], ...] = (
-    (-1.0, 0.0, "the other sign"),
-    (180.0 / math.pi, 0.0, "degrees for radians"),
-    (math.pi / 180.0, 0.0, "radians for degrees"),
-    (1.0 / 0.3048, 0.0, "feet for metres"),
-    (0.3048, 0.0, "metres for feet"),
-    (3.6 / 1.852, 0.0, "knots for m/s"),
-    (1.852 / 3.6, 0.0, "m/s for knots"),
-    (3.6, 0.0, "km/h for m/s"),
-    (10.0, 0.0, "ten times too large"),
-    (0.1, 0.0, "ten times too small"),
-    (100.0, 0.0, "a hundred times too large"),
-    (0.01, 0.0, "a hundred times too small"),
-    (1000.0, 0.0, "a thousand times too large"),
-    (0.001, 0.0, "a thousand times too small"),
-    (10.055, 0.0, "kPa for metres of sea water"),
-    (60.0, 0.0, "per minute for per second"),
-    (1.0 / 60.0, 0.0, "per second for per minute"),
-    (30.0 / math.pi, 0.0, "revolutions per minute for rad/s"),
-    (math.pi / 30.0, 0.0, "rad/s for revolutions per minute"),
+KNOWN: tuple[tuple[float, float, str, str], ...] = (
+    (-1.0, 0.0, "the other sign", ""),
+    (180.0 / math.pi, 0.0, "degrees for radians", r"rad"),
+    (math.pi / 180.0, 0.0, "radians for degrees", r"deg|°"),
+    (1.0 / 0.3048, 0.0, "feet for metres", r"m(/s)?$|dbar"),
+    (0.3048, 0.0, "metres for feet", r"ft|feet"),
+    (3.6 / 1.852, 0.0, "knots for m/s", r"m/s$"),
+    (1.852 / 3.6, 0.0, "m/s for knots", r"kn"),
+    (3.6, 0.0, "km/h for m/s", r"m/s$"),
+    (10.0, 0.0, "ten times too large", ""),
+    (0.1, 0.0, "ten times too small", ""),
+    (100.0, 0.0, "a hundred times too large", ""),
+    (0.01, 0.0, "a hundred times too small", ""),
+    (1000.0, 0.0, "a thousand times too large", ""),
+    (0.001, 0.0, "a thousand times too small", ""),
+    (10.055, 0.0, "kPa for metres of sea water", r"m$|dbar"),
+    (60.0, 0.0, "per minute for per second", r".*/s$"),
+    (1.0 / 60.0, 0.0, "per second for per minute", r".*/min$"),
+    (30.0 / math.pi, 0.0, "revolutions per minute for rad/s", r"rad/s$"),
+    (math.pi / 30.0, 0.0, "rad/s for revolutions per minute", r"rpm|rev/min"),
+    (2.0 * math.pi, 0.0, "rad/s for revolutions per second", r"rev/s$"),
 )
-"""Errors of a logger that people make: factor, offset in turns, words. Each is a peak of the prior."""
+"""Errors of a logger that people make: factor, offset in turns, words, and of which units (a regular expression; "" is
+any). Each is a peak of the prior."""
 OF_ACTUATORS = 5.0
 """A smaller factor of an input may be the gain of its actuator. [-]"""
-KNOWN_ANGLES: tuple[tuple[float, float, str], ...] = (
-    (1.0, 0.25, "a quarter of a turn too large"),
-    (1.0, -0.25, "a quarter of a turn too small"),
-    (1.0, 0.5, "half a turn off"),
-    (-1.0, 0.25, "counted from east, against the clock"),
-    (-1.0, 0.5, "counted from south, against the clock"),
-    (-1.0, -0.25, "counted from west, against the clock"),
+KNOWN_ANGLES: tuple[tuple[float, float, str, str], ...] = (
+    (1.0, 0.25, "a quarter of a turn too large", ""),
+    (1.0, -0.25, "a quarter of a turn too small", ""),
+    (1.0, 0.5, "half a turn off", ""),
+    (-1.0, 0.25, "counted from east, against the clock", ""),
+    (-1.0, 0.5, "counted from south, against the clock", ""),
+    (-1.0, -0.25, "counted from west, against the clock", ""),
 )
 """The same for angles."""
 
@@ -269,7 +272,8 @@ def data_terms(model: Model) -> list[Term]:
         sensor = model.channels[name]
         known = [
             (f, sensor.turn * turns, words)
-            for f, turns, words in (*KNOWN, *(KNOWN_ANGLES if sensor.angle else ()))
+            for f, turns, words, units in (*KNOWN, *(KNOWN_ANGLES if sensor.angle else ()))
+            if not sensor.unit or re.match(units, sensor.unit)
         ]
         soft = [
             ("offset", "has an offset"),
@@ -316,7 +320,7 @@ def data_terms(model: Model) -> list[Term]:
 def input_terms(model: Model) -> list[Term]:
     """Return terms of the errors that the inputs of a record may have."""
     odds, pairs = PRIOR_DATA / max(len(model.inputs), 1), list(combinations(model.inputs, 2))
-    known = [(f, words) for f, _, words in KNOWN if f < 0.0 or max(f, 1.0 / f) > OF_ACTUATORS]
+    known = [(f, words) for f, _, words, _ in KNOWN if f < 0.0 or max(f, 1.0 / f) > OF_ACTUATORS]
     units = [
         Term(f"input:{name}", f"the input {name}: {words}", "input", name, odds / len(known), factor=factor)
         for name in model.inputs

@@ -87,3 +87,17 @@ def test_a_healthy_record_is_accused_of_nothing(seed, index):
     verdict = subzero.diagnose(logged, budget="verdict")
     assert verdict.verdict == "nothing_wrong"
     assert not verdict.data_errors
+
+
+def test_depth_in_decimetres_is_named_with_its_remedy_and_so_is_a_compass_that_is_turned():
+    """No unit of the table is ten times a metre: the error is y = a + b x, with b = 10."""
+    clean = measured("dive", 20263)
+    values = dict(clean.record.values)
+    values["depth"], values["heading"] = 10.0 * values["depth"], values["heading"] + 90.0
+    record = Record(source="made", time=clean.record.time, values=values)
+    verdict = subzero.diagnose(dataclasses.replace(clean, record=record), budget="verdict")
+    assert (verdict.verdict, verdict.then) == ("data_error", "nothing_wrong")
+    depth, heading = sorted(verdict.data_errors, key=lambda error: error.id)
+    assert (depth.id, heading.id) == ("affine:depth", "reference:heading=is 90 degrees too large")
+    assert depth.remedy == "divide it by 10"
+    assert heading.remedy == "subtract 90 degrees"
