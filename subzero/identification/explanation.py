@@ -45,7 +45,7 @@ the rate of a clock. [-]"""
 PRIOR_CAUSE, MOST_LIKELY, PRIOR_TOLERANCES, PRIOR_DATA, PRIOR_NEXT_DATA = 0.5, 0.05, 0.1, 0.1, 0.3
 """Prior odds that any one cause acts, and most of a single one; that tolerances are too narrow; that the readings of a
 channel have any one error; and of such an error in a logger that has one already. [-]"""
-PRIOR_UNKNOWN = 0.05
+PRIOR_UNKNOWN = 0.02
 """Prior odds that any one input acts that is 0 in a healthy model. [-]"""
 
 ONSET_ODDS = 0.2
