@@ -179,13 +179,10 @@ def _others(
     errors: Sequence[tuple[int, DataError]],
 ) -> dict[Ids, Fitted]:
     """Return the fits of "nothing is wrong" and of the most probable other explanations, of the same records."""
-    same = [
-        each
-        for each in pool
-        if each is not best and each.is_of_catalogue and {*each.errors} == {*errors} and each.causes
-    ]
-    worth = [each for each in same if each.probability > RIVAL_PROBABILITY][:MAX_FITTED]
-    plain = next((each for each in pool if not each.causes and {*each.errors} == {*errors}), pool[0])
+    known = {(record, error.id) for record, error in errors}
+    same = [each for each in pool if each is not best and each.is_of_catalogue and each.error_ids == known]
+    worth = [each for each in same if each.causes and each.probability > RIVAL_PROBABILITY][:MAX_FITTED]
+    plain = next((each for each in same if not each.causes), best)
     nothing = replace(plain, causes=(), fit=replace(plain.fit, terms=()))
     return {(): fitted(problem, asked.onsets, nothing)} | {
         each.causes: fitted(problem, asked.onsets, each) for each in worth

@@ -49,6 +49,11 @@ class Explanation:
     is_wide: bool
 
     @property
+    def error_ids(self) -> set[tuple[int, str]]:
+        """Records and ids of the errors in its data, whatever their sizes."""
+        return {(record, error.id) for record, error in self.errors}
+
+    @property
     def is_of_catalogue(self) -> bool:
         """Whether it has no other terms than causes of the catalogue and errors in the data."""
         return len(self.ids) == len(self.causes) + len({error.id for _, error in self.errors})
