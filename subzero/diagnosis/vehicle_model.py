@@ -89,6 +89,7 @@ def vehicle_model(
         ],
         causes=[*map(_cause, known.throughout.values()), *map(_onset, known.onsets.values())],
         unknown=[_force(axis, usual=axis in axes) for axis in AXES],
+        parallel=True,
     )
     return model, [
         _record(k, each, setting, channels, inputs)
@@ -338,13 +339,14 @@ class _Simulations:
 
     def track(self, asked: _Asked, setting: Setting) -> Track:
         """Return the track of a simulation."""
-        same = [asked.same_until(other) for other, *_ in self._kept]
+        kept = self._kept  # another thread may replace it
+        same = [asked.same_until(other) for other, *_ in kept]
         best = int(np.argmax(same)) if same else -1
         if same and same[best] == np.inf:
-            return self._kept[best][1]
-        times = [time for time in self._kept[best][2] if time <= same[best]] if same else []
+            return kept[best][1]
+        times = [time for time in kept[best][2] if time <= same[best]] if same else []
         if times:
-            return simulate_on(setting, self._kept[best][2][max(times)])
+            return simulate_on(setting, kept[best][2][max(times)])
         step = setting.trial.cable_step
         grid = np.rint(np.arange(1, STOPS) * setting.trial.duration / STOPS / step) * step
         track, stops = with_stops(setting, grid.tolist())

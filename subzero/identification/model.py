@@ -249,6 +249,7 @@ class Model:
         unknown: inputs that are not known: part of every explanation, or offered as a term of one.
         tuned_on: parameter → channels through which it was tuned: an error of such a channel moves the parameter.
         batch: whether it computes many sets at once: numbers are (k,), inputs (n, 1) or (n, k), readings (n, k).
+        parallel: whether it may be called by several threads at once.
     """
 
     simulate: Simulate
@@ -259,6 +260,7 @@ class Model:
     unknown: Sequence[Unknown] = ()
     tuned_on: Mapping[str, Sequence[str]] = field(default_factory=dict)
     batch: bool = False
+    parallel: bool = False
 
     def __post_init__(self) -> None:
         if not callable(self.simulate):

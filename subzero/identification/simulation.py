@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from os import cpu_count
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -86,7 +88,13 @@ class Runs:
         self.count += len(runs)
         if self.model.batch and runs:
             return self._batch(runs)
-        return [self._checked(self._call(run.numbers, run.unknown, run), run, 0) for run in runs]
+        if self.model.parallel and len(runs) > 1:
+            with ThreadPoolExecutor(cpu_count()) as pool:
+                return list(pool.map(self._single, runs))
+        return [self._single(run) for run in runs]
+
+    def _single(self, run: Asked) -> dict[str, np.ndarray]:
+        return self._checked(self._call(run.numbers, run.unknown, run), run, 0)
 
     def _batch(self, runs: Sequence[Asked]) -> list[dict[str, np.ndarray]]:
         """Return the readings of runs with the same inputs."""

@@ -8,6 +8,8 @@ Truth is exact: a heated rod, its middle and its end are first-order lags, one b
 the exact solution at other times.
 """
 
+import dataclasses
+
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -120,3 +122,10 @@ def test_inputs_in_each_others_columns_beside_a_cause():
     verdict = sd.diagnose(swapped(record(7, a=1.4), "power", "second"), model())
     assert {each.id for each in verdict.named} == {"exchanged:power/second", "loss"}
     assert verdict.named[0].sentence == "the inputs power and second have each other's columns"
+
+
+def test_several_threads_change_nothing():
+    made = swapped(record(gain=1.5), "rod", "middle")
+    assert str(sd.diagnose(made, dataclasses.replace(model(), parallel=True))) == str(
+        sd.diagnose(made, model())
+    )
