@@ -121,21 +121,22 @@ def outcome(
 def _searched(
     model: Model, records: Sequence[Record], report: Progress, end: float, *, screen: bool = False
 ) -> tuple[Search, dict[str, int]]:
-    """Return the search, which goes on from its best explanation without the outliers that this shows, until some
-    processor time [s]; and channel → how many.
+    """Return the search, until some processor time [s]; and channel → how many outliers it is without.
+
+    It begins anew without the outliers that its best explanation so far shows.
     """
     count: dict[str, int] = {}
-    best: Fit | None = None
+    begin: Fit | None = None
     problem: Problem | None = None
-    for last in range(PASSES):
+    for left in reversed(range(PASSES)):
         problem = Problem(model, records, before=problem)
-        search = Search(problem, report, end - process_time(), best)
-        search.screen() if screen else search.run()
-        best = search.ranked()[0]
-        outliers = search.problem.outliers(best.terms, best.linear.e)
-        if not (outliers and search.complete) or last == PASSES - 1:
+        search = Search(problem, report, end - process_time(), begin)
+        search.start()
+        if not (left and search.outliers()):
+            search.screen() if screen else search.run(with_outliers=not left)
+        if not left or not (outliers := search.outliers()):
             break
-        records = search.problem.without(outliers)
+        begin, records = search.ranked()[0], search.problem.without(outliers)
         count |= {name: count.get(name, 0) + int(found.sum()) for name, found in outliers.items()}
     return search, count
 

@@ -11,7 +11,7 @@ noise takes more than is usual: with the best explanation, and without the cause
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from time import process_time
 
@@ -161,10 +161,34 @@ class Search:
         scores = [score for name, score in ranks.items() if name not in self.fits and score < least]
         return float(logsumexp(scores)) if scores else -math.inf
 
-    def run(self) -> None:
-        """Search until no move gains, the time is over, or the user interrupts it: what was found is kept."""
+    def start(self) -> None:
+        """Fit "nothing is wrong", and the explanation from which the search goes on: that with gross errors in the data
+        alone, if none is given.
+        """
+        self._within_time(self._start)
+
+    def screen(self) -> None:
+        """Rank one term more than the best of the first fits in the linear problem."""
+        self._best_additions(self.ranked()[0].linear)
+        self.complete = False
+
+    def run(self, *, with_outliers: bool) -> None:
+        """Search until no move gains; or, if not `with_outliers`, until the best explanation shows some, without which
+        the search is to begin anew.
+        """
+        self._within_time(lambda: self._run(with_outliers))
+
+    def outliers(self) -> dict[str, np.ndarray]:
+        """Return channel → which readings (m,) are outliers of the best explanation so far; none if the time is
+        over.
+        """
+        best = self.ranked()[0]
+        return self.problem.outliers(best.terms, best.linear.e) if self.complete else {}
+
+    def _within_time(self, part: Callable[[], None]) -> None:
+        """Do a part of the search; if its time is over, or the user interrupts it, what was found is kept."""
         try:
-            self._run()
+            part()
         except _TimeOverError:
             self.complete = False
         except KeyboardInterrupt:
@@ -172,32 +196,24 @@ class Search:
                 raise
             self.complete = False
 
-    def screen(self) -> None:
-        """Fit gross errors in the data alone, and rank one term more in the linear problem."""
-        nominal = self._nominal()
-        self._fit(self._greedy(nominal))
-        self._fit(nominal)
-        self._best_additions(self.ranked()[0].linear)
-        self.complete = False
-
-    def _nominal(self) -> Linear:
-        """Return the nominal model, linearised."""
+    def _start(self) -> None:
         problem, entries = self.problem, self.problem.entries(())
         centre = np.array([entry.centre for entry in entries])
-        return linearised(problem, (), entries, centre, usual_levels(problem, ()), must=True)
-
-    def _run(self) -> None:
-        problem, nominal = self.problem, self._nominal()
+        nominal = linearised(problem, (), entries, centre, usual_levels(problem, ()), must=True)
         if (fitted := self.begin) is None:
             self._fit(self._greedy(nominal))
         else:
             self._fit(linearised(problem, fitted.terms, fitted.entries, fitted.x, fitted.linear.levels))
         self._fit(nominal)
+
+    def _run(self, with_outliers: bool) -> None:
         for first in {key(each.terms): each for each in (self.fits[()], self.ranked()[0])}.values():
             self._fit_single_causes(first)
         while (base := self._next()) is not None or self._fit_unknown():
             if len(self.fits) >= MOST_FITS:
                 self.complete = False
+                return
+            if not with_outliers and self.outliers():
                 return
             if base is not None:
                 self._expand(base)
