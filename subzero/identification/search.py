@@ -170,7 +170,6 @@ class Search:
     def screen(self) -> None:
         """Rank one term more than the best of the first fits in the linear problem."""
         self._best_additions(self.ranked()[0].linear)
-        self.complete = False
 
     def run(self, *, with_outliers: bool) -> None:
         """Search until no move gains; or, if not `with_outliers`, until the best explanation shows some, without which

@@ -35,6 +35,7 @@ from subzero.diagnosis.results import (
     OUTSIDE,
     UNDECIDED,
     Cause,
+    Curves,
     Detectability,
     FoundError,
     Rival,
@@ -126,7 +127,7 @@ def concluded(asked: Asked, outcome: Outcome, detectable: tuple[Detectability, .
         unknown=rest.unknown,
         gain=rest.gain,
         next_trial=rest.next_trial,
-        curves=rest.curves,
+        curves=_with_recorded(rest.curves, asked.records, errors),
         notes=(*outcome.verdict.notes, *_notes(problem, _tolerance_scale(outcome), unstable)),
         seed=asked.seed,
         complete=outcome.search.complete,
@@ -246,6 +247,23 @@ def _found_errors(
                     amount_sd=error.amount_sd,
                     since=error.since,
                 )
+
+
+def _with_recorded(
+    curves: Mapping[str, Curves], records: Sequence[Logged], errors: Sequence[tuple[int, DataError]]
+) -> dict[str, Curves]:
+    """Return record → curves, with times and values as they were recorded of channels that have errors."""
+    found = dict(curves)
+    for k, each in enumerate(records):
+        channels = {
+            name
+            for record, error in errors
+            if record in (-1, k) and not error.is_of_commands
+            for name in error.channels
+        }
+        recorded = {name: (each.record.time, each.record.values[name]) for name in sorted(channels)}
+        found[each.name] = replace(found[each.name], recorded=recorded)
+    return found
 
 
 def _listed(pool: Sequence[Explanation]) -> dict[str, float]:
