@@ -25,7 +25,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import is_absent, moves_nothing, with_tolerances
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.latent_force import AXIS_WORDS
+from subzero.diagnosis.inference.latent_force import AXIS_WORDS, DRIFT
 from subzero.diagnosis.inference.simulator import (
     Stop,
     Track,
@@ -43,6 +43,8 @@ OF_ANY_MODEL = ("sensor_bias", "sensor_scale", "clock_offset")
 """Effects that `Sensor` and errors in the data say."""
 KNOWN_SPREAD, USUAL_SPREAD = 0.1, 0.7
 """Standard deviation of the logarithm of a sensor's level: given by the user, or that of usual sensors. [-]"""
+DRIFT_LEVELS, DRIFT_TIME_S = 6.0, 5.0
+"""Usual size of a drift, in levels of the sensor [-], and over which time it changes [s]."""
 AFTERWARDS = ("sensors", "clock")
 """Slots of effects that act on a finished simulation."""
 TRIAL = "trial"
@@ -88,7 +90,7 @@ def vehicle_model(
             *_numbers(known.starts, general.Start),
         ],
         causes=[*map(_cause, known.throughout.values()), *map(_onset, known.onsets.values())],
-        unknown=[_force(axis, usual=axis in axes) for axis in AXES],
+        unknown=[*(_force(axis, usual=axis in axes) for axis in AXES), *map(_drift, channels)],
         parallel=True,
     )
     return model, [
@@ -122,6 +124,18 @@ def _force(axis: str, *, usual: bool) -> general.Unknown:
         usual=usual,
         sentence=f"a {AXIS_WORDS[axis]} acts that no cause explains",
         unit="N" if axis in "XYZ" else "N m",
+    )
+
+
+def _drift(channel: str) -> general.Unknown:
+    """Return the drift of a sensor over time, which may act."""
+    return general.Unknown(
+        f"{DRIFT}{channel}",
+        DRIFT_LEVELS * SPECS[channel].noise,
+        DRIFT_TIME_S,
+        usual=False,
+        sentence=f"the sensor of the {channel.replace('_', ' ')} drifts",
+        unit=BY_NAME[channel].unit,
     )
 
 
@@ -282,7 +296,8 @@ def _simulate(
             force,
         )
         setting = with_effects(setting, on, late, t, force)
-        return read(setting, kept.track(asked, setting), t, channels)
+        shown = read(setting, kept.track(asked, setting), t, channels)
+        return {name: values + u.get(f"{DRIFT}{name}", 0.0) for name, values in shown.items()}
 
     return simulate
 

@@ -26,6 +26,7 @@ from subzero.diagnosis.inference import (
     sensitive_runs,
     with_finer_steps,
 )
+from subzero.diagnosis.inference.latent_force import DRIFT, FORCE
 from subzero.diagnosis.results import (
     CALIBRATED,
     CAUSE_NAMED,
@@ -53,7 +54,7 @@ from subzero.diagnosis.verdict.pool import (
     posed,
     without_errors,
 )
-from subzero.diagnosis.verdict.terms import DRIFT, FORCE, id_of
+from subzero.diagnosis.verdict.terms import id_of
 from subzero.identification.api import UNSEEN, Outcome
 
 LISTED_PROBABILITY, RIVAL_PROBABILITY = 1e-4, 0.01

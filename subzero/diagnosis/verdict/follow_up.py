@@ -23,6 +23,7 @@ from subzero.diagnosis.inference import (
     fit_with_drift,
     samples_of,
 )
+from subzero.diagnosis.inference.latent_force import FORCE
 from subzero.diagnosis.results import (
     CALIBRATED,
     CAUSE_NAMED,
@@ -38,7 +39,6 @@ from subzero.diagnosis.results import (
 )
 from subzero.diagnosis.verdict.estimates import extended_by, name, places
 from subzero.diagnosis.verdict.pool import Explanation
-from subzero.diagnosis.verdict.terms import FORCE
 
 if TYPE_CHECKING:
     from subzero.diagnosis.verdict.conclude import Asked

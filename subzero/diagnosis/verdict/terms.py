@@ -16,13 +16,12 @@ import numpy as np
 
 from subzero.channels import BY_NAME, HEADING
 from subzero.diagnosis.hypothesis.data_error import COMMAND_GROUPS, LEAST, REFERENCES, DataError
+from subzero.diagnosis.inference.latent_force import DRIFT, FORCE
 from subzero.identification.explanation import CLOCK, Term, kinds_of
 from subzero.identification.fit import Fit
 from subzero.identification.problem import Problem
 from subzero.records.consistency import MISTAKEN
 
-FORCE, DRIFT = "unknown_force:", "sensor_drift:"
-"""Prefixes of the ids of explanations out of the catalogue."""
 OF_SENSORS = {"offset": ("sensor_bias", "shift"), "scale": ("sensor_scale", "share")}
 """Kind of a term → effect of the catalogue, and its parameter."""
 ENTRIES = {
@@ -88,7 +87,7 @@ def id_of(problem: Problem, fit: Fit, term: Term) -> str:
     if cause := cause_of(fit, term):
         return cause
     if term.kind == "unknown":
-        return f"{FORCE}{term.target}"
+        return term.target if term.target.startswith(DRIFT) else f"{FORCE}{term.target}"
     if term.kind == "drift":
         return f"{DRIFT}{term.target}"
     error = data_error(problem, fit, term)
