@@ -51,10 +51,12 @@ class Search:
     Attributes:
         seed: of everything random.
         screen: only the first look, in a few seconds.
+        seconds: of processor time, after which the search is ended, and says so; 120 if not given.
     """
 
     seed: int = 0
     screen: Flag = False
+    seconds: float | None = None
 
     @property
     def budget(self) -> str:
@@ -314,5 +316,11 @@ def _ask(logged: list[Logged], own: tuple[Effect, ...], search: Search, output_m
     seen = None if output_mode.as_json or output_mode.quiet else print_plan
     with progress_bar("Diagnosing", lambda: COSTS) as progress:
         return diagnose_trials(
-            logged, effects=own, progress=progress, seed=search.seed, budget=search.budget, seen=seen
+            logged,
+            effects=own,
+            progress=progress,
+            seed=search.seed,
+            budget=search.budget,
+            seen=seen,
+            seconds=search.seconds,
         )

@@ -35,6 +35,9 @@ from subzero.records.record import Record
 BUDGETS = ("screen", "verdict", "full")
 """Linear evidence only; up to the verdict and the extended model; with gain and next trial."""
 
+SEARCH_S = 120.0
+"""Processor time of a search, if no other is given. [s]"""
+
 Given = Logged | Record | identification.Record | str | Path
 Seen = Callable[[tuple[Detectability, ...]], None]
 
@@ -69,7 +72,8 @@ def diagnose(
         seed: of all random numbers.
         budget: "full", "verdict" without gain and next trial, or "screen" for the screening alone, in a few seconds.
         held_out: records of a model of your own that no fit sees.
-        seconds: of processor time, after which the search for a model of your own is ended. [s]
+        seconds: of processor time, after which the search is ended, and says so; for a model of your own without a
+            limit if not given. [s]
 
     Raises:
         UserError: a record, a sidecar or an effects file cannot be used.
@@ -79,7 +83,7 @@ def diagnose(
         return _of_own_model(records, model, held_out, seconds, progress)
     own = load(effects) if isinstance(effects, str | Path) else tuple(effects)
     logged = _logged([records] if isinstance(records, Given) else records, model, commands)
-    return diagnose_trials(logged, effects=own, progress=progress, seed=seed, budget=budget)
+    return diagnose_trials(logged, effects=own, progress=progress, seed=seed, budget=budget, seconds=seconds)
 
 
 def _of_own_model(
@@ -123,6 +127,7 @@ def diagnose_trials(
     seen: Seen | None = None,
     seed: int = 0,
     budget: str = "full",
+    seconds: float | None = None,
 ) -> Verdict:
     """Say what the nominal models of some records get wrong, and why.
 
@@ -133,9 +138,10 @@ def diagnose_trials(
         seen: called with the detectability of causes, before the records are searched.
         seed: of all random numbers.
         budget: one of BUDGETS.
+        seconds: of processor time, after which the search is ended, and says so; SEARCH_S if not given. [s]
 
     Raises:
-        UserError: no record, seed or budget; the nominal model cannot be run through a trial.
+        UserError: no record, seed, budget or time; the nominal model cannot be run through a trial.
     """
     if not records:
         raise UserError(NO_RECORD)
@@ -148,6 +154,7 @@ def diagnose_trials(
         "seen": seen,
         "seed": seed,
         "budget": budget,
+        "seconds": SEARCH_S if seconds is None else seconds,
     }
     try:
         verdict = _diagnosed(records, **asked)
@@ -167,6 +174,7 @@ def _diagnosed(
     seen: Seen | None,
     seed: int,
     budget: str,
+    seconds: float,
 ) -> Verdict:
     """Diagnose records, all of whose channels can be used."""
     began, report = perf_counter(), Steady(progress or (lambda share, words: None))
@@ -185,7 +193,9 @@ def _diagnosed(
             seen(detectable)
         model, own = vehicle_model(records, effects=effects)
         searched = perf_counter()
-        outcome = identification.api.outcome(own, model, progress=report, screen=budget == "screen")
+        outcome = identification.api.outcome(
+            own, model, progress=report, seconds=seconds, screen=budget == "screen"
+        )
         concluding = perf_counter()
         verdict = concluded(asked, outcome, detectable)
     parts = {

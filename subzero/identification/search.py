@@ -120,6 +120,7 @@ class Search:
         fits: explanation → its best fit.
         ranks: explanation with one term more than another → its score in the linear problem of that one.
         complete: whether it came to its end.
+        interrupted: whether the user ended it.
     """
 
     problem: Problem
@@ -129,6 +130,7 @@ class Search:
     fits: dict[Key, Fit] = field(default_factory=dict)
     ranks: dict[Key, dict[Key, float]] = field(default_factory=dict)
     complete: bool = True
+    interrupted: bool = False
 
     def __post_init__(self) -> None:
         self._end = process_time() + self.seconds
@@ -193,7 +195,7 @@ class Search:
         except KeyboardInterrupt:
             if not self.fits:
                 raise
-            self.complete = False
+            self.complete, self.interrupted = False, True
 
     def _start(self) -> None:
         problem, entries = self.problem, self.problem.entries(())

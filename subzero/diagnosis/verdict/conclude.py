@@ -131,7 +131,7 @@ def concluded(asked: Asked, outcome: Outcome, detectable: tuple[Detectability, .
         curves=_with_recorded(rest.curves, asked.records, errors),
         notes=(*outcome.verdict.notes, *_notes(problem, _tolerance_scale(outcome), unstable)),
         seed=asked.seed,
-        complete=outcome.search.complete,
+        complete=not outcome.search.interrupted,
         unstable=tuple(run.record for run in unstable),
     )
 
