@@ -23,13 +23,15 @@ values = {
 }
 log = subzero.Record(source="a log", time=time, values=values)
 
-# "screen" only ranks the causes; "verdict" and "full" fit them and test the fits.
+# "screen" ranks the causes and fits the first; "verdict" and "full" fit all that may be true, and test the fits.
 verdict = subzero.diagnose(log, "fig6", budget="screen")
 print(verdict)
 
-likely = sorted(verdict.probabilities.items(), key=lambda item: item[1])[-6:]
-names = [name.replace("_", " ").replace(":", " of ") for name, _ in likely]
+(curves,) = verdict.curves.values()
 figure, axes = plt.subplots(layout="constrained", figsize=(6.4, 3.2))
-axes.barh(names, [probability for _, probability in likely])
-axes.set(xlabel="probability [1]", title="What explains the log", xlim=(0.0, 1.0))
+axes.plot(curves.time, curves.measured["surge_speed"], ".", markersize=2, color="0.6", label="measured")
+for name, line in {"nominal": "--", "extended": "-"}.items():
+    axes.plot(curves.time, curves.models[name]["surge_speed"], line, label=f"{name} model")
+axes.set(xlabel="time [s]", ylabel="surge speed [m/s]", title=verdict.sentence)
+axes.legend()
 figure.savefig("diagnose.png", dpi=150)

@@ -1,10 +1,9 @@
 """Diagnosis: which physical cause explains where a simulation differs from measured records, and how sure that is.
 
-    records + nominal model → residuals → linearisation → evidence of every hypothesis → MAP fits → verdict
+    records + trials → model → explanations and their probabilities (`subzero.identification`) → verdict on the trial
 
-Bayesian variable selection on the parameters of a simulator. A hypothesis is a set of causes: their parameters have
-the wide prior N(0, s²), all others the narrow one N(0, (κτ)²). Its evidence is Laplace's, around a MAP fit with real
-simulations, mixed over κ. Change points and latent forces compete with the causes on the same scale.
+Bayesian model selection on a simulator. An explanation is a set of terms: causes of the catalogue, errors in the data,
+drifts, unknown forces. Numbers of a cause have the wide prior N(0, s²), all others the narrow one N(0, τ²).
 
 symbol       name                                                     unit          module
 -----------  -------------------------------------------------------  ------------  --------------------------
@@ -13,13 +12,12 @@ z            deviations of all parameters from the nominal model      their own 
 h(z)         readings of the sensors in a simulation                  channel's     inference.simulator
 W            whitening by the noise: level, colour, gaps              1             hypothesis.noise
 r, J         whitened residual W (y − h(z)), and ∂(W h)/∂z            1             inference.problem
-κ            scale of all tolerances, mixed over 1, 2, 4              1             inference.linear_gaussian
 D            squared Mahalanobis distance to the closest rival        1             assessment.identifiability
 
-Reading order: `api`, the entry point; `results`, the values that are returned; then hypothesis, inference,
-assessment, verdict, report. The public names are listed here, and imported from their files when they are first used:
-compiled code imports the configuration, and an edit of a report must not compile it again. The engine's parts have
-interfaces of their own, `subzero.diagnosis.inference` and `subzero.diagnosis.assessment`.
+Reading order: `api`, the entry point; `results`, the values that are returned; `vehicle_model`, the trial as a model;
+then hypothesis, inference, assessment, verdict, report. The public names are listed here, and imported from their files
+when they are first used: compiled code imports the configuration, and an edit of a report must not compile it again.
+The parts have interfaces of their own, `subzero.diagnosis.inference` and `subzero.diagnosis.assessment`.
 """
 
 from importlib import import_module

@@ -121,6 +121,7 @@ class Search:
         ranks: explanation with one term more than another → its score in the linear problem of that one.
         complete: whether it came to its end.
         interrupted: whether the user ended it.
+        screened: the explanation to which one term more was only ranked; None for a whole search.
     """
 
     problem: Problem
@@ -131,6 +132,7 @@ class Search:
     ranks: dict[Key, dict[Key, float]] = field(default_factory=dict)
     complete: bool = True
     interrupted: bool = False
+    screened: Key | None = None
 
     def __post_init__(self) -> None:
         self._end = process_time() + self.seconds
@@ -157,11 +159,20 @@ class Search:
         """Return the log of the sum of the scores of the best explanation with one term more, of those that were not
         worth a fit: records that do not show a cause do not exclude it.
         """
-        best = self.ranked()[0]
-        ranks = self.ranks.get(key(best.terms), {})
-        least = self.score(best) - WORTH
-        scores = [score for name, score in ranks.items() if name not in self.fits and score < least]
+        scores = list(self.unseen().values())
         return float(logsumexp(scores)) if scores else -math.inf
+
+    def unseen(self) -> dict[Key, float]:
+        """Return explanations with one term more that were not worth a fit, with the scores that they are ranked with;
+        of a screening, all that were not fitted, none of them with more than the best fit.
+        """
+        best = self.ranked()[0]
+        most = self.score(best)
+        ranks = self.ranks.get(key(best.terms) if self.screened is None else self.screened, {})
+        unfitted = {name: score for name, score in ranks.items() if name not in self.fits}
+        if self.screened is not None:
+            return {name: min(score, most) for name, score in unfitted.items()}
+        return {name: score for name, score in unfitted.items() if score < most - WORTH}
 
     def start(self) -> None:
         """Fit "nothing is wrong", and the explanation from which the search goes on: that with gross errors in the data
@@ -170,8 +181,10 @@ class Search:
         self._within_time(self._start)
 
     def screen(self) -> None:
-        """Rank one term more than the best of the first fits in the linear problem."""
-        self._best_additions(self.ranked()[0].linear)
+        """Rank one term more than the best of the first fits in the linear problem, and fit the first of them."""
+        base = self.ranked()[0]
+        self.screened = key(base.terms)
+        self._fit_ranked(base.linear, self._best_additions(base.linear)[:1])
 
     def run(self, *, with_outliers: bool) -> None:
         """Search until no move gains; or, if not `with_outliers`, until the best explanation shows some, without which

@@ -35,6 +35,7 @@ EACH = (
     DataError(kind="reference", channels=("heading",), how="is 90 degrees too large"),
     DataError(kind="reference", channels=("heading",), how="counts counter-clockwise from east"),
     DataError(kind="affine", channels=("depth",), amount=0.4, scale=1.7),
+    DataError(kind="unit", channels=("depth",), how="feet", since=12.0),
     DataError(kind="command_unit", channels=("propeller_command",), scale=2.0),
     DataError(kind="step", channels=("pitch",), amount=3.0, since=12.0),
     DataError(kind="frozen", channels=("roll_angle",), since=20.0, at=tuple(np.arange(20.0, 60.0, 0.1))),

@@ -166,12 +166,14 @@ def unturned(heading: np.ndarray) -> np.ndarray:
 
 
 def _values(change: Callable[[DataError, np.ndarray, np.ndarray], np.ndarray]) -> Change:
-    """Return a change of a record that changes the values of one channel: (error, time, values) → values."""
+    """Return a change of a record that changes the values of one channel, from the time on from which an error holds:
+    (error, time, values) → values.
+    """
 
     def changed(error: DataError, logged: Logged) -> Logged:
         (channel,) = error.channels
-        new = change(error, logged.record.time, logged.record.values[channel])
-        return _with(logged, **{channel: new})
+        time, values = logged.record.time, logged.record.values[channel]
+        return _with(logged, **{channel: np.where(time >= error.since, change(error, time, values), values)})
 
     return changed
 
@@ -384,6 +386,10 @@ def _spans(times: tuple[float, ...]) -> str:
     return f"{len(times)} samples between {times[0]:g} and {times[-1]:g} s" if times else "no sample"
 
 
+def _since(error: DataError) -> str:
+    return f" from {error.since:.3g} s on" if error.since else ""
+
+
 def _number(error: DataError, scale: float = 1.0) -> str:
     """Return the size of an error's number, with half its interval of 95 %."""
     sd = f" ± {1.96 * scale * error.amount_sd:.2g}" if error.amount_sd else ""
@@ -415,7 +421,7 @@ KINDS: Mapping[str, Kind] = {
     "unit": Kind(
         _values(_in_right_unit),
         _values(_in_wrong_unit),
-        lambda suspect: f"{_both(suspect)} is in {suspect.how}",
+        lambda suspect: f"{_both(suspect)} is in {suspect.how}{_since(suspect)}",
         _unit_remedy,
     ),
     "reference": Kind(
@@ -457,6 +463,7 @@ KINDS: Mapping[str, Kind] = {
         lambda suspect: (
             f"{_both(suspect)} shows {suspect.scale:.4g} times what it should"
             f"{f', and {suspect.amount:+.3g} {BY_NAME[suspect.channels[0]].unit}' if suspect.amount else ''}"
+            f"{_since(suspect)}"
         ),
         lambda suspect: (
             f"{f'subtract {suspect.amount:.3g}, and ' if suspect.amount else ''}divide it by {suspect.scale:.4g}"

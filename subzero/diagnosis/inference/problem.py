@@ -127,7 +127,7 @@ class Problem:
         return self._changed(early, record, z, late=True) if late else early
 
     def roughly(self, z: np.ndarray) -> Problem:
-        """Return the same in coarser steps, for the sensitivities of a linear screening; itself if the error of such
+        """Return the same in coarser steps, for the sensitivities to a force; itself if the error of such
         steps at deviations z (k,) is visible above the noise.
         """
         whole = np.zeros(0)

@@ -1,1 +1,1 @@
-"""From findings to a verdict: decision rule, estimates with intervals, the extended model."""
+"""From the explanations of a search to a verdict: terms in the words of a trial, estimates, the extended model."""

@@ -54,7 +54,7 @@ from subzero.diagnosis.verdict.pool import (
     posed,
     without_errors,
 )
-from subzero.diagnosis.verdict.terms import id_of
+from subzero.diagnosis.verdict.terms import id_of, ids_of_ranked
 from subzero.identification.api import UNSEEN, Outcome
 
 LISTED_PROBABILITY, RIVAL_PROBABILITY = 1e-4, 0.01
@@ -117,7 +117,7 @@ def concluded(asked: Asked, outcome: Outcome, detectable: tuple[Detectability, .
         causes=causes,
         rivals=rivals,
         data_errors=tuple(_found_errors(asked.records, errors, named)),
-        probabilities=_listed(pool),
+        probabilities=_listed(pool, outcome),
         tolerance_scale=_tolerance_scale(outcome),
         detectable=detectable,
         misfit={
@@ -267,11 +267,21 @@ def _with_recorded(
     return found
 
 
-def _listed(pool: Sequence[Explanation]) -> dict[str, float]:
-    """Return explanation → probability, the most probable first, with that of what the records do not show."""
-    found = {name(each.ids): each.probability for each in pool if each.probability > LISTED_PROBABILITY}
-    rest = 1.0 - sum(each.probability for each in pool)
-    found |= {UNSEEN: rest} if rest > LISTED_PROBABILITY else {}
+def _listed(pool: Sequence[Explanation], outcome: Outcome) -> dict[str, float]:
+    """Return explanation → probability, the most probable first, with that of one term more that the records do not
+    show; in a screening, of each one that was ranked.
+    """
+    found = {name(each.ids): each.probability for each in pool}
+    rest = max(1.0 - sum(found.values()), 0.0)
+    if outcome.search.screened is None:
+        found[UNSEEN] = rest
+    else:
+        ranks = outcome.search.unseen()
+        share = rest * np.exp(np.array(list(ranks.values())) - outcome.search.log_unseen())
+        for each, p in zip(ranks, share.tolist(), strict=True):
+            ids = name(ids_of_ranked(each))
+            found[ids] = found.get(ids, 0.0) + p
+    found = {ids: p for ids, p in found.items() if p > LISTED_PROBABILITY}
     return dict(sorted(found.items(), key=lambda pair: -pair[1]))
 
 

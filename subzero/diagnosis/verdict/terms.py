@@ -20,6 +20,7 @@ from subzero.diagnosis.inference.latent_force import DRIFT, FORCE
 from subzero.identification.explanation import CLOCK, Term, kinds_of
 from subzero.identification.fit import Fit
 from subzero.identification.problem import Problem
+from subzero.identification.search import Key
 from subzero.records.consistency import MISTAKEN
 
 OF_SENSORS = {"offset": ("sensor_bias", "shift"), "scale": ("sensor_scale", "share")}
@@ -92,6 +93,18 @@ def id_of(problem: Problem, fit: Fit, term: Term) -> str:
         return f"{DRIFT}{term.target}"
     error = data_error(problem, fit, term)
     return error.id if error else term.id
+
+
+def ids_of_ranked(name: Key) -> tuple[str, ...]:
+    """Return the ids of an explanation that was ranked and not fitted: without sizes and onsets."""
+    return tuple(sorted({_id_of_ranked(id.partition("@")[0]) for id, *_ in name if id != "tolerances"}))
+
+
+def _id_of_ranked(id: str) -> str:
+    kind, _, target = id.partition(":")
+    if kind in OF_SENSORS:
+        return f"{OF_SENSORS[kind][0]}:{target}"
+    return {f"delay:{CLOCK}": "clock_offset", f"drift:{target}": f"{DRIFT}{target}"}.get(id, id)
 
 
 def data_error(problem: Problem, fit: Fit, term: Term) -> DataError | None:
