@@ -159,7 +159,8 @@ class Term:
 
     def about(self, target: str) -> Term:
         """Return the same error of another channel."""
-        id, sentence = (words.replace(self.target, target, 1) for words in (self.id, self.sentence))
+        own = rf"\b{re.escape(self.target)}\b"
+        id, sentence = (re.sub(own, target, words, count=1) for words in (self.id, self.sentence))
         return replace(self, id=id, sentence=sentence, target=target)
 
     @property

@@ -46,8 +46,8 @@ from subzero.identification.nearness import follows
 from subzero.identification.problem import Problem, Progress
 from subzero.identification.sensitivities import Sensitivities
 
-MOST_TERMS = 8
-"""An explanation has no more terms."""
+MOST_TERMS, MANY_TERMS = 8, 3
+"""An explanation has no more terms; where it needs more than so many, an unknown input may act instead of them."""
 RANKED_AGAIN, FITTED = 10, 6
 """So many of the best are ranked again with their own noise; at most so many of these are fitted."""
 WITHIN = 5.0
@@ -231,6 +231,8 @@ class Search:
                 return
             if base is not None:
                 self._expand(base)
+            if len(self.ranked()[0].terms) > MANY_TERMS:
+                self._fit_unknown()
 
     def _fit_unknown(self) -> bool:
         """Fit inputs that are 0 in a healthy model, where they may explain what nothing else does: with the best

@@ -129,3 +129,10 @@ def test_several_threads_change_nothing():
     assert str(sd.diagnose(made, dataclasses.replace(model(), parallel=True))) == str(
         sd.diagnose(made, model())
     )
+
+
+def test_an_error_of_another_channel_has_its_name_also_where_that_is_one_letter():
+    from subzero.identification.explanation import Term
+
+    there = Term("delay:a", "a is late or early against the inputs", "delay", "a").about("b")
+    assert (there.id, there.sentence) == ("delay:b", "b is late or early against the inputs")
