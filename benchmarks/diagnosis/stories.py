@@ -19,8 +19,8 @@ import numpy as np
 import subzero
 from benchmarks.diagnosis.story_cases import STORIES, Story
 from benchmarks.gallery import small
-from subzero import write_diagnosis
 from subzero.channels import BY_NAME
+from subzero.cli import write_diagnosis
 from subzero.cli.diagnosis import simulated
 from subzero.diagnosis.hypothesis.catalogue import START, catalogue
 from subzero.diagnosis.hypothesis.configuration import Setting

@@ -185,6 +185,10 @@ class Search:
         base = self.ranked()[0]
         self.screened = key(base.terms)
         self._fit_ranked(base.linear, self._best_additions(base.linear)[:1])
+        best = self.ranked()[0]
+        bare = None if best is base else self.there(best.linear, base.terms)
+        if bare:  # the fit of the base may have ended far below what this one leaves
+            self._fit(bare, self._own_score(bare), again=True)
 
     def run(self, *, with_outliers: bool) -> None:
         """Search until no move gains; or, if not `with_outliers`, until the best explanation shows some, without which
