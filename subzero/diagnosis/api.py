@@ -147,6 +147,8 @@ def diagnose_trials(
         raise UserError(NO_RECORD)
     whole("seed", seed)
     chosen(dict.fromkeys(BUDGETS), budget, "budget")
+    if seconds is not None and not seconds > 0.0:
+        raise UserError(f"diagnose: seconds is {seconds!r}; it must be greater than 0.")
     effects = with_own(effects, records[0].setting.model.vehicle)
     asked: dict[str, Any] = {
         "effects": effects,

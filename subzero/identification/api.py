@@ -435,12 +435,11 @@ def _sizes(problem: Problem, linear: Linear, term: Term) -> list[tuple[str, floa
 
 
 def _notes(problem: Problem, search: Search, outliers: Mapping[str, int]) -> tuple[str, ...]:
-    found = []
+    aside = {name: int(each.spikes.sum()) + outliers.get(name, 0) for name, each in problem.channels.items()}
+    counts = ", ".join(f"{name} {count}" for name, count in aside.items() if count)
+    why = "outside the record's time, or alone far from their neighbours or from the best explanation"
+    found = [f"Readings that are set aside ({why}): {counts}."] if counts else []
     for name, each in problem.channels.items():
-        spikes = int(each.spikes.sum()) + outliers.get(name, 0)
-        if spikes:
-            why = "outside the record's time, or alone far from their neighbours or from the best explanation"
-            found.append(f"{name}: {spikes} readings are set aside: {why}.")
         if problem.model.channels[name].noise is None:
             found.append(f"{name}: the noise of its sensor, {each.prior.level:.2g}, was read off the record.")
     if not search.complete:

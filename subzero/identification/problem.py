@@ -586,8 +586,8 @@ def _input(record: Record, name: str) -> np.ndarray:
 def jumps(values: np.ndarray) -> np.ndarray:
     """Return the sizes of steps between readings (m,) that stand alone among the largest."""
     steps = np.abs(np.diff(values))
-    beside = np.maximum(np.append(steps[1:], 0.0), np.append(0.0, steps[:-1]))
-    return steps[(steps > 0.5 * steps.max(initial=0.0)) & (steps > ALONE * beside)]
+    neighbours = np.maximum(np.append(steps[1:], 0.0), np.append(0.0, steps[:-1]))
+    return steps[(steps > 0.5 * steps.max(initial=0.0)) & (steps > ALONE * neighbours)]
 
 
 def are_turns(alone: np.ndarray, turn: float) -> bool:

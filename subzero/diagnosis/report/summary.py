@@ -302,7 +302,8 @@ def _times(levels: float) -> str:
 
 def _next(verdict: Verdict) -> Iterator[str]:
     """Yield the next steps with the records, the vehicle and the model."""
-    yield from (f"In {error.record}: {error.remedy}." for error in verdict.data_errors if verdict.then)
+    for error in verdict.data_errors if verdict.then else ():
+        yield f"In {error.record}, {' and '.join(error.columns)}: {error.remedy}."
     if verdict.on_model == CAUSE_NAMED:
         places = list(dict.fromkeys(filter(None, (_place(cause.id) for cause in verdict.causes))))
         yield from (f"Look at {place}." for place in places)

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from subzero.diagnosis.report.words import (
+    DRIFT,
+    FORCE,
     NOTHING,
     channel,
     estimate,
@@ -151,7 +153,8 @@ def _worth(found: Sequence[Rival]) -> Sequence[Rival]:
 
 def rival_in_words(rival: Rival) -> str:
     """Return a rival in words; a force or a drift in everyday words."""
-    return explanation(_id(rival), {_id(rival): rival.sentence} if ":" not in _id(rival) else {})
+    is_outside = any(id.startswith((FORCE, DRIFT)) for id in rival.ids)
+    return explanation(_id(rival)) if is_outside else rival.sentence
 
 
 def _id(rival: Rival) -> str:

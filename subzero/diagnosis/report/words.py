@@ -45,6 +45,18 @@ NOTHING = "–"
 FORCE, DRIFT = "unknown_force:", "sensor_drift:"
 """Prefixes of the ids of explanations out of the catalogue."""
 
+ERRORS = {
+    "affine": "has another scale or zero",
+    "sign": "has the other sign",
+    "unit": "is in another unit",
+    "reference": "has another reference",
+    "step": "jumps",
+    "frozen": "is frozen",
+    "dropout": "repeats a value in place of measurements",
+    "swapped": "have each other's values",
+    "latency": "is late or early",
+}
+"""Kind of an error in the data of a column → words, where its sizes are not known."""
 PUSHES = {
     "X": ("pushes the hull forward", "holds the hull back", "pushes the hull forward and back"),
     "Y": ("pushes the hull to starboard", "pushes the hull to port", "pushes the hull from side to side"),
@@ -153,6 +165,9 @@ def _explained(name: str, known: Mapping[str, str]) -> str:
         return something(name.removeprefix(FORCE))
     if name.startswith(DRIFT):
         return f"the sensor of the {_spaced(name.removeprefix(DRIFT))} drifts"
+    kind, _, where = name.partition("=")[0].partition(":")
+    if kind in ERRORS:
+        return f"{' and '.join(map(column, where.split('/')))} {ERRORS[kind]}"
     what, _, since = name.partition("@")
     sentence = known.get(what) or description_of(name).get("sentence", _spaced(what))
     return f"from {since} s on {sentence}" if since else sentence

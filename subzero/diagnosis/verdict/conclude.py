@@ -46,7 +46,6 @@ from subzero.diagnosis.results import (
 from subzero.diagnosis.verdict.estimates import between, cause_of, deviations, extended_by, name
 from subzero.diagnosis.verdict.follow_up import Report, follow_up
 from subzero.diagnosis.verdict.pool import (
-    WIDE,
     Explanation,
     best_of,
     fitted,
@@ -56,6 +55,7 @@ from subzero.diagnosis.verdict.pool import (
 )
 from subzero.diagnosis.verdict.terms import id_of, ids_of_ranked
 from subzero.identification.api import UNSEEN, Outcome
+from subzero.identification.explanation import WIDER
 
 LISTED_PROBABILITY, RIVAL_PROBABILITY = 1e-4, 0.01
 """Explanations that are less probable are not listed, and are no rivals of the reported one."""
@@ -109,7 +109,7 @@ def concluded(asked: Asked, outcome: Outcome, detectable: tuple[Detectability, .
     )
     rest = follow_up(asked, report)
     causes = tuple(cause_of(reported, each, named[each]) for each in report.causes)
-    rivals = _rivals(asked, report)
+    rivals = _rivals(report, {error.id for _, error in errors})
     return Verdict(
         verdict=verdict,
         then=on_model if verdict == DATA_ERROR else "",
@@ -191,22 +191,23 @@ def _others(
     }
 
 
-def _rivals(asked: Asked, report: Report) -> tuple[Rival, ...]:
+def _rivals(report: Report, errors: set[str]) -> tuple[Rival, ...]:
     """Return the rivals of the reported explanation, the most probable first; where none is reported, all that
-    remain.
+    remain: of the records without the errors that are named.
     """
     undecided = report.on_model == UNDECIDED
     listed = [each for each in report.pool if undecided or each is not report.best]
     worth = [each for each in listed if each.probability >= RIVAL_PROBABILITY][:MAX_RIVALS] or listed[:1]
-    return tuple(_rival(asked, report, each) for each in worth)
+    return tuple(_rival(report, each, errors) for each in worth)
 
 
-def _rival(asked: Asked, report: Report, each: Explanation) -> Rival:
+def _rival(report: Report, each: Explanation, errors: set[str]) -> Rival:
+    ids = tuple(id for id in each.ids if id not in errors)
     of = report.fit if each is report.best else report.others.get(each.causes)
-    known = of if each.is_of_catalogue and not set(each.ids) - set(each.causes) else None
+    known = of if set(ids) == set(each.causes) else None
     return Rival(
-        ids=each.ids,
-        sentence=" and ".join(sentence_of(report, each, id) for id in each.ids) or "nothing is wrong",
+        ids=ids,
+        sentence=" and ".join(sentence_of(report, each, id) for id in ids) or "nothing is wrong",
         probability=each.probability,
         discrimination=between(report.fit, report.best.causes, each.causes)
         if each is not report.best
@@ -290,7 +291,7 @@ def _tolerance_scale(outcome: Outcome) -> dict[float, float]:
     ranked = outcome.search.ranked()
     wide = [any(term.kind == "tolerances" for term in each.terms) for each in ranked]
     p = float(np.sum(outcome.probabilities, where=np.array(wide)) / np.sum(outcome.probabilities))
-    return {1.0: 1.0 - p, WIDE: p}
+    return {1.0: 1.0 - p, WIDER: p}
 
 
 def _sentence(
@@ -319,14 +320,14 @@ SENTENCES = {
     NOTHING_WRONG: "Nothing is wrong beyond the tolerances of the model.",
     CALIBRATED: "No cause is named, but numbers of the model had to move beyond their tolerances: it wants "
     "calibration. `subzero calibrate` estimates them.",
-    NOTHING_NEAR: "Nothing comes near: the best explanation leaves more than noise, or bends what it does not name.",
+    NOTHING_NEAR: "Nothing comes near: the best explanation leaves more than noise, or needs other numbers that are far off.",
 }
 
 
 def _notes(problem: Problem, scale: Mapping[float, float], unstable: Sequence[SensitiveRun]) -> Iterator[str]:
     """Yield further remarks for a reader."""
-    if scale[WIDE] > scale[1.0]:
-        yield f"The declared tolerances look too tight: {WIDE:g} times as wide explains the records best."
+    if scale[WIDER] > scale[1.0]:
+        yield f"The declared tolerances look too tight: {WIDER:g} times as wide explains the records best."
     for run in unstable:
         yield (
             f"{run.record}: an unstable motion, which no simulation follows for long. At a vehicle that is a little "

@@ -20,12 +20,9 @@ from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import Observed, Problem, pose, refit, with_change_point
 from subzero.diagnosis.verdict.terms import ENTRIES, cause_of, data_error, ids_of
 from subzero.identification.api import Outcome
-from subzero.identification.explanation import CLOCK, Term
+from subzero.identification.explanation import CLOCK, WIDER, Term
 from subzero.identification.fit import Fit as PoolFit
 from subzero.identification.problem import Problem as PoolProblem
-
-WIDE = 4.0
-"""Scale of the tolerances where they are too narrow, as `identification.explanation.WIDER`. [-]"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -127,7 +124,7 @@ def fitted(problem: Problem, effects: Mapping[str, Effect], explanation: Explana
     """
     z = deviations(problem, explanation.fit)
     causes = tuple(name for name in explanation.causes if "@" not in name)
-    D = variances(problem.entries, causes, WIDE if explanation.is_wide else 1.0)
+    D = variances(problem.entries, causes, WIDER if explanation.is_wide else 1.0)
     for term in explanation.fit.terms:
         if term.kind == "cause" and "@" in cause_of(explanation.fit, term):
             effect, known = effects[term.target], _numbers(explanation.fit, term)
