@@ -224,15 +224,8 @@ def test_what_is_known_of_a_time_is_a_normal_distribution_whose_variance_is_not_
         assert found == pytest.approx(np.log(beside / normal))
 
 
-A_LAG_BY_CHANCE = pytest.mark.xfail(
-    strict=True,
-    reason="in this dive the slow noise of the depth gauge looks like a lag of it, which is told with 0.97: one of "
-    "some thirty such statements may be wrong",
-)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("index", [4, pytest.param(76, marks=A_LAG_BY_CHANCE)])
+@pytest.mark.parametrize("index", [4, 76])
 def test_a_healthy_record_with_white_and_slow_noise_at_once_gets_no_name(index):
     """With one noise for all, that behind the best fit, both were named with 0.99."""
     logged, planted = world.record_of(world.drawn(7301, index + 1)[index])

@@ -320,7 +320,7 @@ SENTENCES = {
     NOTHING_WRONG: "Nothing is wrong beyond the tolerances of the model.",
     CALIBRATED: "No cause is named, but numbers of the model had to move beyond their tolerances: it wants "
     "calibration. `subzero calibrate` estimates them.",
-    NOTHING_NEAR: "Nothing comes near: the best explanation leaves more than noise, or needs other numbers that are far off.",
+    NOTHING_NEAR: "Nothing comes near: the best explanation leaves more than noise, or needs numbers that are far off.",
 }
 
 
