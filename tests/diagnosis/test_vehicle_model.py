@@ -67,3 +67,16 @@ def test_another_drag_throughout_is_another_simulation(model_and_record):
     nominal = readings(model, record)
     more = readings(model, record, **{"hull_drag:share": 0.4})
     assert more["surge_speed"][-1] < nominal["surge_speed"][-1] - 0.02
+
+
+def test_the_drift_of_a_sensor_is_added_to_its_readings_alone(model_and_record):
+    model, record = model_and_record
+    nominal = readings(model, record)
+    u = {name: record.columns[name] for name in model.inputs}
+    u |= {"X": np.zeros(record.time.size), "sensor_drift:heading": np.linspace(0.0, 3.0, record.time.size)}
+    from subzero.identification.simulation import nested
+
+    p = {name: value for name, value in model.nominal().items() if not isinstance(value, dict)}
+    shown = model.simulate(nested(p), u, record.time)
+    assert np.allclose(shown["heading"] - nominal["heading"], u["sensor_drift:heading"])
+    assert np.array_equal(shown["depth"], nominal["depth"])
