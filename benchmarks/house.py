@@ -42,6 +42,7 @@ FACES = {
     "subzero.errors",
     "subzero.diagnosis.inference",
     "subzero.diagnosis.assessment",
+    "subzero.diagnosis.verdict",
 }
 FACES |= {"subzero.diagnosis.report"}
 """Modules that tests of a package may import."""

@@ -27,7 +27,7 @@ from subzero.diagnosis.inference import Progress, pose, respond
 from subzero.diagnosis.read_trials import read_trials
 from subzero.diagnosis.results import Detectability, Verdict
 from subzero.diagnosis.vehicle_model import Effects, vehicle_model
-from subzero.diagnosis.verdict.conclude import Asked, concluded
+from subzero.diagnosis.verdict import Asked, concluded
 from subzero.errors import UserError, chosen, whole
 from subzero.model import Model
 from subzero.records.record import Record
