@@ -25,7 +25,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import is_absent, moves_nothing, with_tolerances
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.inference.latent_force import AXIS_WORDS, DRIFT
+from subzero.diagnosis.inference.latent_force import AXIS_WORDS, DRIFT, with_missing_force
 from subzero.diagnosis.inference.simulator import (
     Stop,
     Track,
@@ -51,7 +51,7 @@ TRIAL = "trial"
 """Input by which the function knows which of several records it simulates."""
 AXIS_SIZES = {"X": 0.02, "Y": 0.02, "Z": 0.02, "K": 0.0005, "M": 0.002, "N": 0.002}
 """Usual size of what the hull's equations miss, by axis: some per cent of the drag at 1 m/s. [N, N m]"""
-AXIS_TIME_S, ACTS_TIME_S = 4.0, 2.0
+AXIS_TIME_S, ACTS_TIME_S = 4.0, 1.5
 """Over which it changes: what the equations miss, and a force that no cause explains, which may be a knock. [s]"""
 ACTS = 15.0
 """Size of a force that acts and that no cause explains, over what the hull's equations usually miss. [-]"""
@@ -319,7 +319,7 @@ def with_effects(
     if not force.any():
         return setting
     missing = MissingForce(time=tuple(time.tolist()), wrench=tuple(map(tuple, force.tolist())))
-    return setting.with_model(missing=missing + setting.model.missing)
+    return with_missing_force(setting, missing)
 
 
 class _Asked(NamedTuple):

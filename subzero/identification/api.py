@@ -6,7 +6,8 @@ problem → search → nearness → locks → verdict
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from time import process_time
 from typing import NamedTuple
 
@@ -33,6 +34,7 @@ from subzero.identification.verdict import (
     NOTHING_WRONG,
     UNDECIDED,
     UNKNOWN_NAMED,
+    UNSEEN,
     Curves,
     Estimate,
     History,
@@ -46,8 +48,6 @@ NAMED_PROBABILITY, HEALTHY_PROBABILITY = 0.9, 0.5
 """A term is named from this probability on, over all explanations."""
 SEEN_ODDS = 9.0
 """Odds from which on a term would be seen: of NAMED_PROBABILITY."""
-UNSEEN = "one thing more that these records do not show"
-"""All explanations with one term more than the best one that were not worth a fit."""
 PASSES = 3
 """Most searches of a diagnosis, each without the outliers that the one before has shown."""
 RELATED = 3.0
@@ -149,8 +149,8 @@ def _concluded(search: Search, held_out: Sequence[Record], outliers: Mapping[str
     marginal = _marginal(ranked, probabilities)
     own = locks(problem, best, held_out) if near.near else {}
     terms = [
-        _named(problem, best, term, marginal[term.id], own.get(term.id), near)
-        for term in best.terms
+        _named(problem, best, term, marginal[_what(term)], own.get(term.id), near)
+        for term in _said(ranked, probabilities)
         if term.kind != "tolerances"
     ]
     named = tuple(
@@ -181,13 +181,38 @@ def _probabilities(search: Search, ranked: Sequence[Fit]) -> np.ndarray:
 
 
 def _marginal(ranked: Sequence[Fit], probabilities: np.ndarray) -> dict[str, float]:
-    """Return the probability of every term, over all explanations; an unseen term may be added to the best one."""
+    """Return the probability of every term, over all explanations; an unseen term may be added to the best one. Of an
+    unknown input it is that any acts: records that show one may not tell where.
+    """
     unseen = 1.0 - float(probabilities.sum())
     found: dict[str, float] = {}
     for each, p in zip((ranked[0], *ranked), (unseen, *probabilities.tolist()), strict=True):
-        for term in each.terms:
-            found[term.id] = found.get(term.id, 0.0) + p
+        for what in {_what(term) for term in each.terms}:
+            found[what] = found.get(what, 0.0) + p
     return found
+
+
+def _said(ranked: Sequence[Fit], probabilities: np.ndarray) -> Iterator[Term]:
+    """Yield the terms of the best explanation; of an unknown input, its sentence names the others that may act in its
+    place, until one of them does so for sure.
+    """
+    places: dict[str, float] = {}
+    sentences: dict[str, str] = {}
+    for each, p in zip(ranked, (probabilities / probabilities.sum()).tolist(), strict=True):
+        for term in (term for term in each.terms if term.kind == "unknown"):
+            places[term.target] = places.get(term.target, 0.0) + p
+            sentences.setdefault(term.target, term.sentence)
+    for term in ranked[0].terms:
+        own = [term.target] if term.kind == "unknown" else []
+        rest = sorted(places.keys() - {term.target}, key=lambda name: -places[name])
+        while own and rest and sum(places[name] for name in own) < NAMED_PROBABILITY * sum(places.values()):
+            own.append(rest.pop(0))
+        yield replace(term, sentence=", or ".join(sentences[name] for name in own)) if own else term
+
+
+def _what(term: Term) -> str:
+    """Return what the probability of a term is about."""
+    return term.kind if term.kind == "unknown" else term.id
 
 
 def _kind(
@@ -219,15 +244,19 @@ def _named(
 
 
 def _histories(problem: Problem, best: Fit, name: str) -> tuple[History, ...]:
-    """Return an unknown input in each record."""
+    """Return an unknown input in each record where it acts, to the knots next to these, at which it is 0."""
     (unit,) = [each.unit for each in problem.model.unknown if each.name == name]
-    sd, found = np.sqrt(best.variance), []
+    found = []
     for k, record in enumerate(problem.records):
-        own = [i for i, entry in enumerate(best.entries) if entry.identity[:3] == ("unknown", name, k)]
-        time = problem.knots[k][name].tolist()
-        found.append(
-            History(record.name, unit, tuple(time), tuple(best.x[own].tolist()), tuple(sd[own].tolist()))
-        )
+        time = problem.knots[k][name]
+        values, sd, acts = np.zeros(time.size), np.zeros(time.size), np.zeros(time.size, dtype=bool)
+        for entry, x, variance in zip(best.entries, best.x.tolist(), best.variance.tolist(), strict=True):
+            if entry.identity[:3] == ("unknown", name, k):
+                i = entry.knot
+                values[i], sd[i], acts[max(i - 1, 0) : i + 2] = x, math.sqrt(variance), True
+        rows = (tuple(row[acts].tolist()) for row in (time, values, sd))
+        if acts.any():
+            found.append(History(record.name, unit, *rows))
     return tuple(found)
 
 

@@ -3,7 +3,7 @@ sentence.
 
     cause                numbers of an effect that is off by default, or a parameter that moves beyond its tolerance
     cause from a time    the same, with the time as a free number
-    unknown              an input that is 0 in a healthy model has some history
+    unknown              an input that is 0 in a healthy model has some history, throughout or for a time
     tolerances           every parameter may move four times as far as its tolerance: a calibration, no cause
     data error           y = a + b x of a channel, with free a and b or at known values, throughout or from a time on
     drift                of a channel, a line in time
@@ -42,7 +42,7 @@ BEYOND, OFFSET_LEVELS, RATE_SCALE = 10.0, 30.0, 0.03
 """Usual error of an offset or a drift, in tolerances of the sensor's zero, or in its levels where none is declared; of
 the rate of a clock. [-]"""
 
-PRIOR_CAUSE, MOST_LIKELY, PRIOR_TOLERANCES, PRIOR_DATA, PRIOR_NEXT_DATA = 0.5, 0.05, 0.1, 0.1, 0.3
+PRIOR_CAUSE, MOST_LIKELY, PRIOR_TOLERANCES, PRIOR_DATA, PRIOR_NEXT_DATA = 0.5, 0.05, 0.1, 0.05, 0.3
 """Prior odds that any one cause acts, and most of a single one; that tolerances are too narrow; that the readings of a
 channel have any one error; and of such an error in a logger that has one already. [-]"""
 PRIOR_UNKNOWN = 0.02
@@ -240,7 +240,7 @@ def cause_terms(model: Model, durations: Sequence[float]) -> list[Term]:
 
 def unknown_terms(model: Model) -> list[Term]:
     """Return a term of every input that is 0 in a healthy model, and may act all the same."""
-    odds = PRIOR_UNKNOWN / max(len(model.offered), 1)
+    odds = 0.5 * PRIOR_UNKNOWN / max(len(model.offered), 1)  # throughout; the rest is that it acts for a time
     return [
         Term(
             f"unknown:{each.name}",
@@ -338,6 +338,19 @@ def input_terms(model: Model) -> list[Term]:
         )
         for a, b in pairs
     ]
+
+
+def for_a_time(term: Term, record: int, begins: float, ends: float, share: float, words: str) -> Term:
+    """Return an unknown input with its knots between two times of a record [s], with a share of its odds."""
+    return replace(
+        term,
+        id=f"{term.id}@{record}",
+        sentence=f"{words}, {term.sentence}",
+        begins=begins,
+        ends=ends,
+        record=record,
+        odds=share * term.odds,
+    )
 
 
 def from_time(term: Term, record: int, time: float, share: float) -> Term:

@@ -19,7 +19,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 from scipy.optimize import minimize, minimize_scalar
 
 from subzero.identification.explanation import Entry, Terms
-from subzero.identification.noise import Filter, Noise, NoisePrior, log_marginal
+from subzero.identification.noise import Filter, Noise, log_marginal, log_times
 from subzero.identification.problem import Problem
 
 SIZE_SPREAD = 1.0
@@ -42,9 +42,6 @@ INVISIBLE = 1e-3
 """A direction that moves all readings of a channel together by less, in levels of its sensor, is none. [-]"""
 SIZE_RANGE = (-5.0, 6.0)
 """Sizes of unknown inputs that are looked at, as logarithms of their ratio to the declared one. [-]"""
-
-QUICK = 0.2
-"""Slow noise that changes in a smaller share of an unknown input's time is not its doing. [-]"""
 NO_SIZES: Mapping[str, float] = MappingProxyType({})
 """Unknown inputs have their declared sizes."""
 
@@ -65,44 +62,6 @@ def usual_levels(problem: Problem, terms: Terms) -> Levels:
         {name: problem.prior(name, terms).usual() for name in problem.channels},
         {unknown.name: 1.0 for unknown in problem.model.unknown},
     )
-
-
-def taken(problem: Problem, fitted: Fit) -> float:
-    """Return what slow noise and unknown inputs take that are larger than usual, in nats: no term gains more by
-    explaining it.
-
-        ½ log|C| − ½ log|C usual| + log prior(usual) − log prior,   C = Σ + J D Jᵀ
-
-    White noise is that of the fit in both, and so is what changes much more quickly than the inputs that are offered. A
-    sensor that has less white noise than it may have is a slow one.
-    """
-    linear = fitted.linear
-    quick = QUICK * min(each.time for each in problem.model.offered)
-    noise = {
-        name: replace(each, slow=min(each.slow, _usual_slow(problem.prior(name, fitted.terms), each)))
-        if each.time > quick
-        else each
-        for name, each in linear.levels.noise.items()
-    }
-    calm = Levels(noise, {name: min(size, 1.0) for name, size in linear.levels.sizes.items()})
-    products = Products(problem, linear.terms, linear.e, linear.J)
-
-    def cost(levels: Levels) -> float:
-        total = products.total(levels.noise)
-        factor = solve(total, linear.entries, levels, linear.off)[2]
-        log_det = float(np.sum(np.log(np.diag(factor[0]))))
-        return total[3] + log_det - log_levels(problem, fitted.terms, levels)
-
-    return cost(linear.levels) - cost(calm)
-
-
-def _usual_slow(prior: NoisePrior, noise: Noise) -> float:
-    """Return how much slow noise is usual with the white noise of a fit: a share of the level; or, where white noise
-    is below the lower end of the level, what the level leaves, half way to its upper end. [unit of the channel]
-    """
-    if noise.white > prior.least:
-        return prior.usual().slow
-    return float(np.sqrt(prior.level * prior.most - noise.white**2))
 
 
 def quieter(problem: Problem, terms: Terms, levels: Levels) -> Levels:
@@ -236,7 +195,20 @@ def log_levels(problem: Problem, terms: Terms, levels: Levels) -> float:
     sizes = sum(
         -0.5 * (np.log(levels.sizes[unknown.name]) / SIZE_SPREAD) ** 2 for unknown in problem.unknown(terms)
     )
-    return float(noise + sizes)
+    return float(noise + sizes) + _log_times(problem, levels)
+
+
+def _log_times(problem: Problem, levels: Levels) -> float:
+    """Return the log prior density of the correlation times of all channels, logger by logger."""
+    loggers: dict[str, list[str]] = {}
+    for name in levels.noise:
+        loggers.setdefault(problem.model.channels[name].logger, []).append(name)
+    return sum(
+        log_times(
+            [levels.noise[name] for name in own], [problem.channels[name].prior.interval for name in own]
+        )
+        for own in loggers.values()
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -310,11 +282,15 @@ def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Le
         white, slow, time = (np.array([before.white, before.slow, before.time]) * np.exp(log)).tolist()
         return Noise(white, slow, time)
 
+    def with_noise(noise: Noise) -> Levels:
+        return replace(levels, noise={**levels.noise, name: noise})
+
     def negative(log: np.ndarray) -> float:
         noise = at(log)
         density = prior.log_density(noise)
         if not np.isfinite(density):
             return 1e300
+        density += _log_times(problem, with_noise(noise))
         return -log_marginal(Filter.of(noise, prior.resolution, times), columns) - density
 
     lasting = np.log(
@@ -327,7 +303,7 @@ def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Le
     options = {"initial_simplex": simplex, "maxfev": 60, "xatol": 0.2, "fatol": ENOUGH}
     found = minimize(negative, best, method="Nelder-Mead", options=options)
     better = found.fun <= tried[0]
-    return replace(levels, noise={**levels.noise, name: at(found.x)}) if better else levels
+    return with_noise(at(found.x)) if better else levels
 
 
 def given_others(

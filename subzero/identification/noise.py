@@ -10,6 +10,7 @@ white (Rasmussen & Williams 2006, app. B; Hartikainen & Särkkä 2010).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,8 +26,11 @@ SLOW_SHARE, SLOW_SPREAD = 0.3, 0.7
 """Usual slow part of a sensor, over its level, and the standard deviation of its logarithm. [-]"""
 SLOWEST_WHITE = 2.0
 """A part whose τ_s is less, in sampling intervals, is white. [-]"""
-TIME_SPREAD = 1.0
-"""Standard deviation of log τ_s about ten sampling intervals. [-]"""
+USUAL_TIME = 10.0
+"""Usual τ_s. [sampling intervals]"""
+TIME_SPREAD, TIME_FREEDOM, TIME_WEIGHT = 0.9, 2.0, 0.1
+"""Usual standard deviation of log τ_s of the channels of a logger about their mean; its degrees of freedom; weight of
+the usual time in this mean, in channels. [-]"""
 FLOOR_SHARE = 1e-6
 """Least level of a sensor whose noise was neither declared nor is seen, over the spread of its readings. [-]"""
 
@@ -71,19 +75,37 @@ class NoisePrior:
 
     def usual(self) -> Noise:
         """Return the noise at its median."""
-        return Noise(self.level, SLOW_SHARE * self.level, 10.0 * self.interval)
+        return Noise(self.level, SLOW_SHARE * self.level, USUAL_TIME * self.interval)
 
     def log_density(self, noise: Noise) -> float:
-        """Return the log prior density of a noise, up to a constant."""
+        """Return the log prior density of σ_w and σ_s, up to a constant; that of τ_s is `log_times`."""
         binds = noise.slow > self.most or abs(np.log(noise.white / self.level)) > BINDING * self.spread
         if binds or noise.time < SLOWEST_WHITE * self.interval:
             return -np.inf
         off = (
             np.log(noise.white / self.level) / self.spread,
             np.log(noise.slow / (SLOW_SHARE * self.level)) / SLOW_SPREAD,
-            np.log(noise.time / (10.0 * self.interval)) / TIME_SPREAD,
         )
         return -0.5 * float(np.sum(np.square(off)))
+
+
+def log_times(noise: Sequence[Noise], intervals: Sequence[float]) -> float:
+    """Return the log prior density of τ_s of the channels of one logger, up to a constant.
+
+        log τ_k ~ N(μ, s²),   μ ~ N(log 10 Δ_k, s²/TIME_WEIGHT),   s² ~ scaled inverse χ²(TIME_FREEDOM, TIME_SPREAD²)
+
+    with μ and s² integrated out: channels of one logger often have one filter. A channel counts as much as its slow
+    part has of its variance, as the time of a part that is not there says nothing.
+
+    Args:
+        noise: of the channels.
+        intervals: of their samples. [s]
+    """
+    off = np.log([each.time / (USUAL_TIME * step) for each, step in zip(noise, intervals, strict=True)])
+    weight = np.array([each.slow**2 / (each.slow**2 + each.white**2) for each in noise])
+    count = float(weight.sum())
+    square = float(weight @ off**2) - float(weight @ off) ** 2 / (count + TIME_WEIGHT)
+    return -0.5 * (TIME_FREEDOM + count) * float(np.log1p(square / (TIME_FREEDOM * TIME_SPREAD**2)))
 
 
 def resolution_of(values: np.ndarray) -> float:

@@ -302,9 +302,20 @@ class Problem:
             Entry("unknown", each.name, 0.0, each.size, k, knot=i)
             for k in range(len(self.records))
             for each in self.unknown(terms)
-            for i in range(self.knots[k][each.name].size)
+            for i in self._acting(k, each, terms)
         ]
         return [self._as_fixed(entry) for entry in (*own, *starts, *unknown)]
+
+    def _acting(self, k: int, unknown: Unknown, terms: Terms) -> list[int]:
+        """Return the knots of an unknown input in record k at which an explanation lets it act."""
+        times = self.knots[k][unknown.name]
+        own = [term for term in terms if term.kind == "unknown" and term.target == unknown.name]
+        spans = [(each.begins, each.ends) for each in own if each.record in (-1, k)]
+        spans += [(-np.inf, np.inf)] if unknown.usual else []
+        acts = np.zeros(times.size, dtype=bool)
+        for begins, ends in spans:
+            acts |= (times >= begins) & (times <= ends)
+        return np.flatnonzero(acts).tolist()
 
     def _as_fixed(self, entry: Entry) -> Entry:
         """Return an entry, at its value where it is fixed."""

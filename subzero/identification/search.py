@@ -4,8 +4,8 @@ It begins twice: at the nominal model, where gross errors in the data are plain 
 fit of "nothing is wrong". Without a gross error a fit moves the parameters to suit the wrong readings: what may stand
 in its place is judged where the fit with it ends.
 
-Inputs that are 0 in a healthy model cost a simulation for each knot. They are offered when nothing else gains, where
-noise takes more than is usual: with the best explanation, and without the causes in it.
+Inputs that are 0 in a healthy model cost a simulation for each knot. They are offered when nothing else gains: with the
+best explanation, and without the causes in it.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ from subzero.identification.fit import (
     linearised,
     quieter,
     starting_point,
-    taken,
     usual_levels,
 )
 from subzero.identification.nearness import follows
 from subzero.identification.problem import Problem, Progress
 from subzero.identification.sensitivities import Sensitivities
+from subzero.identification.time_spans import best_span
 
 MOST_TERMS, MANY_TERMS = 8, 3
 """An explanation has no more terms; where it needs more than so many, an unknown input may act instead of them."""
@@ -255,19 +255,10 @@ class Search:
         return len(self.fits) > before
 
     def _fit_unknown_with(self, base: Fit) -> None:
-        """Fit unknown inputs with a base, once, where they may gain."""
-        if key(base.terms) not in self._offered and self._may_gain(base):
+        """Fit unknown inputs with a base, once."""
+        if key(base.terms) not in self._offered:
             self._offered.add(key(base.terms))
             self._fit_ranked(base.linear, self._ranked_unknown(base.linear))
-
-    def _may_gain(self, base: Fit) -> bool:
-        """Return whether a base leaves more than its sensors may err, or slow noise takes as much of it as an unknown
-        input has to gain.
-        """
-        if not follows(self.problem, base):
-            return True
-        least = min(-math.log(term.odds) for term in self._unknown)
-        return taken(self.problem, base) > least - WORTH
 
     def _causes_of(self, base: Fit) -> list[Term]:
         """Return the terms of an explanation but for gross errors in the data: an unknown input may look like them."""
@@ -286,16 +277,28 @@ class Search:
         """Return explanations with one unknown input more with their scores, ranked with their own noise."""
         if len(base.terms) >= MOST_TERMS:
             return []
+        present = {term.id for term in base.terms}
         there = [
-            self.there(base, with_term(base.terms, term), term)
-            for term in self._unknown
-            if term not in base.terms
+            linear for term in self._unknown if term.id not in present for linear in self._acting(base, term)
         ]
-        found = [(self._linear_score(linear), linear) for linear in there if linear]
-        self.ranks.setdefault(key(base.terms), {}).update({key(each.terms): score for score, each in found})
-        found.sort(key=lambda pair: -pair[0])
+        found = sorted(((self._linear_score(linear), linear) for linear in there), key=lambda pair: -pair[0])
+        ranks = {key(each.terms): score for score, each in reversed(found)}
+        self.ranks.setdefault(key(base.terms), {}).update(ranks)
         again = [self._with_own_noise(linear) for linear in self._worth_own_noise(found)]
         return self._distinct(sorted(again, key=lambda pair: -pair[0]))
+
+    def _acting(self, base: Linear, term: Term) -> Iterator[Linear]:
+        """Yield explanations with an unknown input more, which acts throughout, or for a time; the latter with the
+        noise of the base and with usual noise.
+        """
+        throughout = self.there(base, with_term(base.terms, term), term)
+        if throughout is None:
+            return
+        yield throughout
+        for levels in (throughout.levels, quieter(self.problem, throughout.terms, throughout.levels)):
+            span = best_span(self.problem, replace(throughout, levels=levels), term)
+            if linear := self.there(throughout, with_term(base.terms, span), span):
+                yield linear
 
     def _fit_single_causes(self, base: Fit) -> None:
         """Fit each cause with a base, if there are few: a rank is of the linear problem, which may be blind to what a
@@ -430,7 +433,7 @@ class Search:
             if nominal := starting_point(self.problem, start.terms, own):
                 second = fit(self.problem, nominal, max(least, fitted.log_evidence))
                 fitted = max(fitted, second, key=self.score)
-        if name not in self.fits or fitted.log_evidence > self.fits[name].log_evidence:
+        if name not in self.fits or self.score(fitted) > self.score(self.fits[name]):
             self.fits[name] = fitted
             self._left.discard(name)
         return self.fits[name]

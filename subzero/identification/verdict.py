@@ -26,6 +26,8 @@ NOTHING_WRONG, CALIBRATED, CAUSE_NAMED, UNKNOWN_NAMED, DATA_ERROR, UNDECIDED, NO
 )
 """Kinds of verdicts."""
 
+UNSEEN = "one thing more that these records do not show"
+"""All explanations with one term more than the best one that were not worth a fit."""
 HEADLINES = {
     NOTHING_WRONG: "Nothing is wrong.",
     CALIBRATED: "No single cause: the parameters are farther off than their tolerances say.",
@@ -75,7 +77,8 @@ class Named:
     Attributes:
         id, sentence: of the term.
         is_data_error: whether it is about the data.
-        probability: that it holds, over all explanations.
+        probability: that it holds, over all explanations; of an unknown input, that any acts: records that show one
+            may not tell where, which the explanations say.
         estimates: its numbers.
         gain: on what was not fitted; None if that was not tried.
         against: why it is not named, though it is probable; ().
@@ -269,8 +272,9 @@ def _nearness_lines(near: Nearness) -> list[str]:
 
 
 def _named_lines(each: Named) -> list[str]:
+    about = " that this or another unknown input acts" if each.history else ""
     lines = [
-        f"{each.sentence[:1].upper()}{each.sentence[1:]}: probability {shown_probability(each.probability)}"
+        f"{each.sentence[:1].upper()}{each.sentence[1:]}: probability {shown_probability(each.probability)}{about}"
     ]
     lines += [f"  {e.name} = {e.value:.4g} ± {e.sd:.2g} (nominal {e.nominal:.4g})" for e in each.estimates]
     lines += [f"  {_history_shown(history)}" for history in each.history]

@@ -14,7 +14,7 @@ from subzero.diagnosis.inference import (
     ForceInformation,
     describe,
     estimate_force,
-    without_force,
+    with_missing_force,
 )
 from subzero.external_force import FEATURES, MissingForce, Term
 
@@ -108,7 +108,7 @@ def test_a_wave_is_called_a_wave(estimated):
 def test_the_drag_that_the_model_lacks_is_found_in_a_record(plant, features):
     """X = −0.02 · wet length, far beyond the tolerances, from six noisy channels."""
     force = MissingForce(terms=(Term("X", "wet_length", -0.02),))
-    planted = plant(lambda setting: without_force(setting, force))
+    planted = plant(lambda setting: with_missing_force(setting, force))
     found = describe(estimate_force(planted.problem, planted.fit(), "X"))
     known = -0.02 * features["wet_length"]
     assert "wet_length" in list(found.features)[:2]

@@ -11,8 +11,8 @@ from subzero.diagnosis.inference import (
     history,
     simulate_on,
     simulate_track,
+    with_missing_force,
     with_stops,
-    without_force,
 )
 
 from .conftest import CHANNELS, nominal
@@ -22,7 +22,7 @@ SETTING, CATALOGUE = nominal(6.0), catalogue(CHANNELS)
 
 def pushed(size, setting=SETTING):
     """Return a setting with a force that begins at 2 s."""
-    return without_force(
+    return with_missing_force(
         setting, history("N", np.array([0.0, 2.0, 4.0, 6.0]), np.array([0.0, 0.0, size, 0.0]))
     )
 

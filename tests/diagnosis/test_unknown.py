@@ -24,7 +24,7 @@ from subzero.diagnosis.inference import (
     history,
     knots_of,
     log_gains,
-    without_force,
+    with_missing_force,
 )
 from subzero.diagnosis.report import summary
 from subzero.records.record import Record
@@ -42,7 +42,7 @@ def bend(time):
 
 
 def pushed(axis, force):
-    return lambda setting: without_force(setting, history(axis, TIME, force(TIME)))
+    return lambda setting: with_missing_force(setting, history(axis, TIME, force(TIME)))
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +83,9 @@ def test_columns_add_up_to_what_a_force_does(healthy):
     problem, zero = healthy.problem, np.zeros(len(healthy.problem.entries))
     knots = knots_of(problem)
     columns = force_columns(problem, zero, ("X",), knots)["X"].sum(axis=1)
-    small = without_force(problem.records[0].setting, history("X", np.array([0.0, 30.0]), np.full(2, 0.05)))
+    small = with_missing_force(
+        problem.records[0].setting, history("X", np.array([0.0, 30.0]), np.full(2, 0.05))
+    )
     tracks = problem.tracks([(0, zero)])[0]
     from subzero.diagnosis.inference import simulate_track
 

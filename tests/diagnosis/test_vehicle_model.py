@@ -62,6 +62,16 @@ def test_a_force_from_some_time_on_changes_nothing_before_it(model_and_record):
     assert fresh["surge_speed"][-1] < nominal["surge_speed"][-1] - 0.02  # a force astern slows it down
 
 
+def test_a_force_goes_on_where_a_cause_begins(model_and_record):
+    model, record = model_and_record
+    push = np.where(record.time > 20.0, -0.5, 0.0)
+    begins = {"since": (10.0, 0.4)}
+    both = readings(model, record, push=push, **begins)["surge_speed"]
+    drag = readings(model, record, **begins)["surge_speed"]
+    np.testing.assert_array_equal(both[record.time <= 20.0], drag[record.time <= 20.0])
+    assert both[-1] < drag[-1] - 0.02  # after the drag has changed, the force still slows it down
+
+
 def test_another_drag_throughout_is_another_simulation(model_and_record):
     model, record = model_and_record
     nominal = readings(model, record)

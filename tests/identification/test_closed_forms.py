@@ -17,6 +17,7 @@ from subzero.identification.noise import (
     NoisePrior,
     level_of,
     log_marginal,
+    log_times,
     middle_of_equal,
     resolution_of,
 )
@@ -97,7 +98,8 @@ def test_the_evidence_of_a_linear_model_is_the_density_of_its_record(problem):
 def prior_of(problem, linear):
     """Return the log prior of noise and sizes, as its definition says."""
     prior = problem.channels["y"].prior
-    return prior.log_density(linear.levels.noise["y"]) - 0.5 * np.log(1.7) ** 2
+    noise = linear.levels.noise["y"]
+    return prior.log_density(noise) + log_times([noise], [prior.interval]) - 0.5 * np.log(1.7) ** 2
 
 
 def test_the_evidence_does_not_depend_on_where_a_linear_model_is_linearised(problem):
@@ -149,6 +151,33 @@ def test_a_declared_level_binds():
     prior = NoisePrior(level=0.1, resolution=0.0, interval=0.1, spread=0.1)
     assert prior.log_density(Noise(0.3, 0.03, 1.0)) == -np.inf
     assert prior.log_density(Noise(0.11, 0.03, 1.0)) > -2.0
+
+
+def test_the_prior_of_correlation_times_has_their_mean_and_spread_integrated_out():
+    """Slow parts without white ones, so that each counts whole; the integral by a rule of its own."""
+    intervals = [0.1, 0.2, 0.1]
+    mean, log_variance = np.meshgrid(np.linspace(-30.0, 30.0, 1501), np.linspace(-6.0, 12.0, 901))
+    variance = np.exp(log_variance)
+
+    def integral(times):
+        log = -1.0 / variance * 0.9**2 - 1.0 * log_variance  # scaled inverse χ² with 2 degrees, in log s²
+        log += -0.5 * 0.1 * mean**2 / variance - 0.5 * log_variance
+        for time, step in zip(times, intervals, strict=True):
+            log += -0.5 * (np.log(time / (10.0 * step)) - mean) ** 2 / variance - 0.5 * log_variance
+        return np.log(np.sum(np.exp(log)))
+
+    def found(times):
+        return log_times([Noise(1e-9, 1.0, time) for time in times], intervals)
+
+    alike, apart = (0.2, 0.3, 0.25), (0.2, 3.0, 0.25)
+    assert found(alike) - found(apart) == pytest.approx(integral(alike) - integral(apart), abs=2e-3)
+    assert found(alike) > found(apart) + 1.0
+
+
+def test_the_correlation_time_of_a_slow_part_that_is_not_there_says_nothing():
+    noise = [Noise(0.1, 0.1, 0.2), Noise(0.1, 0.1, 0.2)]
+    there = [log_times([*noise, Noise(1.0, 1e-4, time)], [0.1] * 3) for time in (0.2, 20.0)]
+    assert there[0] == pytest.approx(there[1], abs=1e-6)
 
 
 def test_the_density_of_a_channel_given_the_others_is_that_of_a_gaussian():

@@ -85,7 +85,7 @@ from subzero.diagnosis.inference.latent_force import (
     history,
     knots_of,
     samples_of,
-    without_force,
+    with_missing_force,
 )
 from subzero.diagnosis.inference.input_estimation import (
     EstimatedForce,
@@ -152,8 +152,8 @@ __all__ = [
     "variances",
     "with_change_point",
     "with_finer_steps",
+    "with_missing_force",
     "with_residual_noise",
     "with_stops",
     "with_tolerances",
-    "without_force",
 ]

@@ -103,7 +103,7 @@ def _drag_of_damping(hull: vehicle.VehicleNumbers) -> float:
     return float(linear + abs(hull.quadratic_damping[0]) + abs(hull.quadratic_table[0, 0]))
 
 
-def without_force(setting: Setting, force: MissingForce) -> Setting:
+def with_missing_force(setting: Setting, force: MissingForce) -> Setting:
     """Return a setting with a missing force, from the start to the end."""
     later = tuple((time, replace(model, missing=force + model.missing)) for time, model in setting.later)
     return replace(setting.with_model(missing=force + setting.model.missing), later=later)
@@ -117,7 +117,7 @@ def history(axis: str, times: np.ndarray, force: np.ndarray) -> MissingForce:
 
 
 def _push(axis: str, times: np.ndarray, L: np.ndarray, setting: Setting, *amounts: float) -> Setting:
-    return without_force(setting, history(axis, times, L @ np.array(amounts)))
+    return with_missing_force(setting, history(axis, times, L @ np.array(amounts)))
 
 
 def force_effect(axis: str, times: np.ndarray, L: np.ndarray, size: float) -> Effect:

@@ -26,6 +26,7 @@ from subzero.diagnosis.results import (
     Cause,
     Verdict,
 )
+from subzero.identification.verdict import UNSEEN
 
 IN_EVERY = 0.9
 """A cause is known if explanations with this total probability share it; a cause is named from the same one on. [-]
@@ -142,6 +143,11 @@ def _sure(verdict: Verdict) -> Iterator[str]:
         yield f"That {error.sentence}: {_in_words(error.probability).lower()}."
     if verdict.on_model == UNDECIDED:
         yield "Not sure enough to name one of them."
+    elif verdict.on_model == OUTSIDE and probability is not None:
+        anything = _anything_unknown(verdict)
+        yield f"That something acts which is no cause of the catalogue: {_in_words(anything).lower()} " + (
+            f"(probability {words.probability(anything)}); that it acts there: {words.probability(probability)}."
+        )
     elif probability is not None:
         sure = f"{_in_words(probability)} (probability {words.probability(probability)})."
         nothing = f"That nothing {'else ' if verdict.then else ''}is wrong: {sure[:1].lower()}{sure[1:]}"
@@ -169,6 +175,17 @@ def _probability(verdict: Verdict) -> float | None:
         reported = [p for name, p in verdict.probabilities.items() if words.is_reported(name, verdict)]
         return sum(reported) if reported else None
     return None
+
+
+def _anything_unknown(verdict: Verdict) -> float:
+    """Return the probability that any force or drift acts that no cause explains: of all explanations that have one,
+    and of one thing more than the reported explanation.
+    """
+    return sum(
+        p
+        for name, p in verdict.probabilities.items()
+        if name == UNSEEN or words.FORCE in name or words.DRIFT in name
+    )
 
 
 def _in_words(probability: float) -> str:

@@ -54,8 +54,9 @@ from subzero.diagnosis.verdict.pool import (
     without_errors,
 )
 from subzero.diagnosis.verdict.terms import id_of, ids_of_ranked
-from subzero.identification.api import UNSEEN, Outcome
+from subzero.identification.api import Outcome
 from subzero.identification.explanation import WIDER
+from subzero.identification.verdict import UNSEEN
 
 LISTED_PROBABILITY, RIVAL_PROBABILITY = 1e-4, 0.01
 """Explanations that are less probable are not listed, and are no rivals of the reported one."""
