@@ -40,7 +40,7 @@ A_NOUN = r"(?-i:\bwhat is\b)(?![^.]*\?)"
 """The phrase used as a noun, not as a question."""
 PROSE = re.compile("|".join([rf"\b(?:{word})\b" for word in PLAIN_WORDS] + [A_NOUN]), re.IGNORECASE)
 IN_NAMES = re.compile(
-    "told|tells?|beside|heed|befalls?|nobody|stays|begun|yardstick|firm|room|promised?|hopes?|astray|outside|unbroken"
+    "told|(?<![a-z])tells?(?![a-z])|beside|heed|befalls?|nobody|stays|begun|yardstick|firm|room|promised?|hopes?|astray|outside|unbroken"
 )
 """Parts of a name that are private words."""
 

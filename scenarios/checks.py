@@ -19,7 +19,7 @@ from scenarios.quantities import Quantity
 from subzero.errors import real
 from subzero.errors import short as shown
 
-OUTSIDE = "this is outside its limits"
+BEYOND_LIMITS = "this is outside its limits"
 NO_NUMBER = "this is not a finite number"
 
 
@@ -133,7 +133,7 @@ class Checks:
         unit = {"degree": " rad", "degree/s": " rad/s", "1": ""}.get(quantity.unit, f" {quantity.unit}")
         file = f" ({number / quantity.scale:g} {quantity.unit})" if quantity.scale != 1.0 else ""
         found = f"{number:g}{unit}{file}"
-        problem = Problem(file=self._owner, key=name, found=found, why=OUTSIDE, remedy=quantity.allowed)
+        problem = Problem(file=self._owner, key=name, found=found, why=BEYOND_LIMITS, remedy=quantity.allowed)
         self._problems.append(problem)
 
     def _column(self, name: str, values: np.ndarray, quantity: Quantity) -> None:

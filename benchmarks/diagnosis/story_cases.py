@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from benchmarks.diagnosis.manoeuvres import braked_rich
 from subzero.diagnosis.assessment import cruise, flown, rudder_doublets
 from subzero.diagnosis.hypothesis.configuration import Setting
-from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED
+from subzero.diagnosis.results import CAUSE_NAMED, NOTHING_WRONG, OUT_OF_CATALOGUE, UNDECIDED
 from subzero.external_force import MissingForce
 
 BASIC = ("surge_speed", "heading", "yaw_rate", "pitch", "roll_angle", "depth")
@@ -118,7 +118,7 @@ STORIES = (
         title="7. A weed that is caught, and lost again",
         words="It drags at the hull from 9 to 21 s and is in no catalogue: its force is recovered as a history.",
         missing=weed(),
-        expected=OUTSIDE,
+        expected=OUT_OF_CATALOGUE,
         figures=("missing_force",),
     ),
 )  # fmt: skip

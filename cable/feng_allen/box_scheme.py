@@ -229,7 +229,7 @@ def remove_node(b: MovingBoxes) -> None:
     w.count[0] = n - 1
 
 
-def with_room(b: MovingBoxes, step: float, segment_length: float) -> MovingBoxes:
+def with_capacity(b: MovingBoxes, step: float, segment_length: float) -> MovingBoxes:
     """Return the cable with space for twice as many nodes as the next step can add."""
     used = int(b.boxes.count[0])
     wanted = used + 8 + int(4.0 * abs(b.boxes.y[used - 1, 1]) * step / segment_length)

@@ -31,7 +31,7 @@ from cable.feng_allen.box_scheme import (
     box_step,
     moving_boxes,
     start_moving_boxes,
-    with_room,
+    with_capacity,
 )
 from cable.feng_allen.equation7 import Equation7Numbers, equation7_numbers, tangent
 from cable.feng_allen.printed_scheme import paper_step
@@ -123,7 +123,7 @@ def pull_out_boxes(task: PullOut, scheme: Equation7) -> BoxHistory:
     start_moving_boxes(b, *velocity_at(task.tow_velocity, 0.0), fixed.drum.friction)
     record.add(0.0, b.boxes, START)
     for k in range(steps):
-        b = with_room(b, step, scheme.segment_length)
+        b = with_capacity(b, step, scheme.segment_length)
         report = _advance(b, fixed, task.tow_velocity, k * step, step, MOST_HALVINGS)
         if report.outcome != CONVERGED:
             remedy = "another time_step or segment_length, or the default scheme (cable.MovingEnd)"

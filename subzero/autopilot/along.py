@@ -25,7 +25,7 @@ import numpy as np
 
 from scenarios import Trial
 from scenarios.steps import whole_steps
-from subzero.autopilot.coupled_plant import CABLE_OUTPUTS, HULL_SIZE, NoRoomError, Tethered, blank_trial
+from subzero.autopilot.coupled_plant import CABLE_OUTPUTS, HULL_SIZE, NoSpaceError, Tethered, blank_trial
 from subzero.channels import BY_NAME
 from subzero.errors import UserError
 from subzero.model import Model, load
@@ -41,7 +41,7 @@ SIZE = 1e-5
 """Largest entry of h δx and h δu [m, m/s, rad, N …]: 0.1 % of it for the drag across the cable, 1e-6 for rounding."""
 SMALLEST = 1e-8
 """Where the disturbed steps do not do the same, such as to split a segment, smaller ones are tried down to this."""
-ROOM = 32.0
+SPARE_LENGTH = 32.0
 """Initial capacity for cable, beyond the cable that is out; doubled as often as needed. [m]"""
 
 
@@ -191,13 +191,13 @@ def linearise_along(
             name: getattr(trial, name) for name in ("cable_step", "hull_step", "segment_length", "grading")
         }
         trial = blank_trial(model, x, start.wet_length, steps)
-    capacity = trial.start.wet_length + ROOM
+    capacity = trial.start.wet_length + SPARE_LENGTH
     while True:
         step = Tethered(trial, model, capacity, x=x, exact=True)
         try:
             states = _run(step, time, commands, parts)
             return Along(time=time, commands=commands, parts=parts, states=states, step=step)
-        except NoRoomError:
+        except NoSpaceError:
             capacity *= 2.0
 
 

@@ -25,7 +25,7 @@ from subzero.engine.coupling import FINE, forget
 from subzero.engine.initial_conditions import RUN_IN, prepare
 from subzero.engine.recording import new_recording
 from subzero.engine.run_state import Live, Orders
-from subzero.engine.time_loop import NO_ROOM, SPARE, run_rows
+from subzero.engine.time_loop import NO_SPACE, SPARE, run_rows
 from subzero.errors import UserError, checked
 from subzero.model import Model
 from subzero.simulation.run import in_words
@@ -82,7 +82,7 @@ def blank_trial(model: Model, x: np.ndarray, wet_length: float, steps: dict[str,
     return Trial(name="plant", duration=duration, start=start, current=model.current, **(nothing | steps))
 
 
-class NoRoomError(UserError):
+class NoSpaceError(UserError):
     """A start or a step needs more cable than was allocated."""
 
 
@@ -145,8 +145,8 @@ class Tethered:
         self._setup.orders.values[0] = u
         times = np.array([t, t + self.sample_time])
         _, _, ending = run_rows(self._setup, live, self._recording, times, 1, 2, 0, 1, 1)
-        if ending == NO_ROOM:
-            raise NoRoomError(
+        if ending == NO_SPACE:
+            raise NoSpaceError(
                 f"plant: at t = {t:g} s there is no room for more than longest = {self._longest:g} m of cable."
             )
         if ending != FINE:

@@ -88,7 +88,7 @@ def _print(found: Calibration, output_folder: OutputFolder, out: Path, console: 
 FORMAT = "subzero calibration 1"
 STRONG = 0.9
 """Correlations from this size on are reported. [-]"""
-MOST_TOLD = 3
+MOST_LISTED = 3
 """Number of directions, correlations and trials that are printed on the terminal; the JSON file has all."""
 WORTH_FLYING = 1.2
 """A trial that makes no interval this many times narrower is not advised. [-]"""
@@ -133,11 +133,11 @@ def headline(found: Calibration) -> str:
 def story(found: Calibration) -> Iterator[str]:
     """Yield the lines that belong below the table; where nothing came near, the reason and the remedy."""
     if found.refused:
-        yield from (*found.refused[:MOST_TOLD], REMEDY, *found.notes)
+        yield from (*found.refused[:MOST_LISTED], REMEDY, *found.notes)
         return
-    for direction in found.directions[:MOST_TOLD]:
+    for direction in found.directions[:MOST_LISTED]:
         yield f"Not determined by these records: {direction.sentence}."
-    for a, b, rho in correlations(found)[:MOST_TOLD]:
+    for a, b, rho in correlations(found)[:MOST_LISTED]:
         yield f"Hardly told apart: {_short(a)} and {_short(b)} (correlation {rho:+.2f})."
     if found.advice and max(found.advice[0].sharper.values()) >= WORTH_FLYING:
         yield "To determine more: " + advised(found.advice[0])
@@ -150,7 +150,7 @@ def story(found: Calibration) -> Iterator[str]:
 def advised(advice: Advice) -> str:
     """Return a trial to fly, and the numbers that it would make sharper."""
     sharper = [(name, factor) for name, factor in advice.sharper.items() if factor >= WORTH_FLYING][
-        :MOST_TOLD
+        :MOST_LISTED
     ]
     words = ", ".join(f"{_short(name)} {factor:.1f} times" for name, factor in sharper)
     return f"{advice.sentence} It would narrow the interval of {words}."

@@ -34,7 +34,7 @@ from subzero.diagnosis.report.toml_file import text_of
 from subzero.diagnosis.results import (
     CAUSE_NAMED,
     NOTHING_WRONG,
-    OUTSIDE,
+    OUT_OF_CATALOGUE,
     UNDECIDED,
     Detectability,
     Extended,
@@ -362,7 +362,7 @@ def _vehicle(run: xr.Dataset) -> dict[str, Any]:
 def _best(verdict: Verdict) -> tuple[str, Extended | None]:
     """Return the model that explains the records best, as the figures have it, and its name."""
     extended = verdict.extended
-    if verdict.on_model in (CAUSE_NAMED, OUTSIDE):
+    if verdict.on_model in (CAUSE_NAMED, OUT_OF_CATALOGUE):
         return "extended model", extended
     first = verdict.rivals[0] if verdict.on_model == UNDECIDED and verdict.rivals else None
     if first is not None and first.ids and first.extended is not None:

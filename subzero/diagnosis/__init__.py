@@ -47,7 +47,7 @@ _HOME = {
     "NextTrial": ("results", "NextTrial"),
     "Number": ("subzero.identification", "Number"),
     "ONSETS": ("hypothesis.catalogue", "ONSETS"),
-    "OUTSIDE": ("results", "OUTSIDE"),
+    "OUT_OF_CATALOGUE": ("results", "OUT_OF_CATALOGUE"),
     "Parameter": ("hypothesis.effect", "Parameter"),
     "Record": ("subzero.identification", "Record"),
     "Rival": ("results", "Rival"),

@@ -15,7 +15,7 @@ from subzero.files.text_repr import Overview
 
 Name = TypeVar("Name")
 
-NOTHING_WRONG, CALIBRATED, CAUSE_NAMED, UNDECIDED, OUTSIDE, NOTHING_NEAR, DATA_ERROR = (
+NOTHING_WRONG, CALIBRATED, CAUSE_NAMED, UNDECIDED, OUT_OF_CATALOGUE, NOTHING_NEAR, DATA_ERROR = (
     "nothing_wrong",
     "calibrated",
     "cause_named",

@@ -66,7 +66,7 @@ an error of first order. A winch may pay out slack, which short segments would f
 NO_WEIGHT = 1e-4
 """A cable that weighs less in water is neutral. [N/m]"""
 NOTHING = MissingForce()
-FIRST_ROOM = 16
+FIRST_SPARE_SEGMENTS = 16
 """Segments that are allocated for a new cable, beyond those that are in the water."""
 
 
@@ -77,7 +77,7 @@ def prepare(
     state: np.ndarray | None = None,
     longest_exchange: float | None = None,
     run_in: float = RUN_IN,
-    room: int = FIRST_ROOM,
+    spare: int = FIRST_SPARE_SEGMENTS,
 ) -> tuple[Setup, Live]:
     """Return the constants and the state of a run at its start: the cable laid straight behind the vehicle.
 
@@ -88,7 +88,7 @@ def prepare(
         state: another first state than that of the trial.
         longest_exchange: longest exchange to allocate the hull's steps for; that of the trial by default. [s]
         run_in: length up to which a cable that begins shorter, on a free drum, has short segments; 0 for even ones. [m]
-        room: number of segments to allocate beyond those in the water.
+        spare: number of segments to allocate beyond those in the water.
 
     Raises:
         UserError: a start that cannot be.
@@ -105,7 +105,7 @@ def prepare(
         path=np.zeros((steps + 1, size)),
         stages=np.zeros((5, size)),
         powers=np.zeros((steps, len(POWERS))),
-        line=new_line(int((wet + RUN_IN) / trial.segment_length) + room),
+        line=new_line(int((wet + RUN_IN) / trial.segment_length) + spare),
         load=new_load(),
     )
     live.line.ends.solver.pulls_only = setup.fixed.snaps

@@ -21,7 +21,7 @@ from subzero.jit import allocating, compiled, deferred_signals
 from subzero.jit.atomic import add
 from subzero.jit.atomic import exchange as exchange_number
 
-NO_ROOM = 4
+NO_SPACE = 4
 """The allocated memory is nearly full: enlarge it and go on. The other endings are in `coupling`."""
 SPARE = 8
 """Nodes that one exchange may add. (A tow point at 40 segments a second would need more: `coupling.FASTEST`.)"""
@@ -78,7 +78,7 @@ def _reach(
     """
     nodes = live.line.ends.count + 1 + SPARE * parts
     if nodes > live.line.length.size or used + live.line.length.size > recording.tension.size:
-        return NO_ROOM
+        return NO_SPACE
     span = (times[at] - times[at - 1]) / parts
     for part in range(parts):
         ending = exchange(setup, live, times[at - 1] + part * span, span)

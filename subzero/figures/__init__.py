@@ -67,8 +67,8 @@ def draw(runs: Runs | xr.Dataset, record: Record | None = None) -> dict[str, Fig
     figures = _prescribed(runs, title) if first.attrs["prescribed"] else _commanded(runs, record, title)
     if "tethered" in runs and is_deployed(runs["tethered"]):
         figures["deployment"] = deployment(runs["tethered"], title)
-    besides = measured(runs, record, title) if record is not None else None
-    return figures if besides is None else {**figures, "measured": besides}
+    more = measured(runs, record, title) if record is not None else None
+    return figures if more is None else {**figures, "measured": more}
 
 
 def _commanded(runs: Runs, record: Record | None, title: Title) -> dict[str, Figure]:

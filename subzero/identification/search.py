@@ -18,7 +18,7 @@ from time import process_time
 import numpy as np
 from scipy.special import logsumexp
 
-from subzero.identification.candidates import declared, suggested
+from subzero.identification.candidates import best_span, declared, suggested
 from subzero.identification.explanation import (
     CLOCK,
     Entry,
@@ -44,7 +44,6 @@ from subzero.identification.fit import (
 from subzero.identification.nearness import follows
 from subzero.identification.problem import Problem, Progress
 from subzero.identification.sensitivities import Sensitivities
-from subzero.identification.time_spans import best_span
 
 MOST_TERMS, MANY_TERMS = 8, 3
 """An explanation has no more terms; where it needs more than so many, an unknown input may act instead of them."""

@@ -58,28 +58,28 @@ _compiled = [0]
 
 
 @cache
-def sources_of(room: str, file: Path | None = None) -> tuple[Path, ...]:
+def sources_of(package: str, file: Path | None = None) -> tuple[Path, ...]:
     """Return the files that the compiled code of a package (``cable``, ``subzero/diagnosis``) may depend on.
 
     The machine code of a function includes other functions and constants of the modules that it imports. By the
     import contracts these are in the function's own package or in the core.
 
     Args:
-        room: folder of the function's package, relative to the root.
+        package: folder of the function's package, relative to the root.
         file: of a function in no package of the product; only this file and the core count.
     """
-    folders = {*CORE, room} if file is None else set(CORE)
+    folders = {*CORE, package} if file is None else set(CORE)
     inside = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
     return tuple(sorted({*inside, *(ROOT / "subzero").glob("*.py"), *([file] if file else [])}))
 
 
 @cache
-def digest_of(room: str, file: Path | None = None) -> str:
+def digest_of(package: str, file: Path | None = None) -> str:
     """Return twelve hexadecimal digits that change with the sources, as `sources_of`, the compiler and its
     settings.
     """
-    digest = hashlib.sha256(repr((_compiler(), room)).encode())
-    for path in sources_of(room, file):
+    digest = hashlib.sha256(repr((_compiler(), package)).encode())
+    for path in sources_of(package, file):
         # The name counts, too: a module that is renamed is another source.
         name = path.relative_to(ROOT) if path.is_relative_to(ROOT) else path
         digest.update(repr((str(name), path.read_bytes())).encode())

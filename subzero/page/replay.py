@@ -177,7 +177,7 @@ def _base64(values: np.ndarray) -> str:
     return base64.b64encode(values.tobytes()).decode("ascii")
 
 
-def as_run(record: Record, beside: xr.Dataset, used: Mapping[str, np.ndarray]) -> xr.Dataset | None:
+def as_run(record: Record, other: xr.Dataset, used: Mapping[str, np.ndarray]) -> xr.Dataset | None:
     """Return a record as a run at its own times, to be shown as a vehicle; None if it does not say where that went.
 
         dx/dt = R(roll, pitch, heading) (u, v, w),    from the position of the other run at the first sample
@@ -187,16 +187,16 @@ def as_run(record: Record, beside: xr.Dataset, used: Mapping[str, np.ndarray]) -
 
     Args:
         record: the measured record.
-        beside: a run of the same trial, which lends its fins, its propeller and the angles that were not measured.
+        other: a run of the same trial, which lends its fins, its propeller and the angles that were not measured.
         used: channel → which samples are no outliers, (samples,) of bool; all of them where it has none.
     """
-    end = float(beside["time"].values[-1])
+    end = float(other["time"].values[-1])
     time = record.time[(record.time >= 0.0) & (record.time <= end)]
     values = {name: _filled(record, name, time, used.get(name)) for name in record.values if name in BY_NAME}
     if time.size < 2 or not ({"north", "east"} <= set(values) or {"surge_speed", "heading"} <= set(values)):
         return None
     from_run = {
-        name: np.interp(time, beside["time"], beside[name]) for name in (*POSE, *ACTUATORS) if name in beside
+        name: np.interp(time, other["time"], other[name]) for name in (*POSE, *ACTUATORS) if name in other
     }
     pose = {name: values.get(name, from_run[name]) for name in ("roll_angle", "pitch", "heading")}
     place = _computed(time, pose, values, {name: from_run[name][0] for name in ("north", "east", "depth")})
@@ -204,7 +204,7 @@ def as_run(record: Record, beside: xr.Dataset, used: Mapping[str, np.ndarray]) -
     data = {name: ("time", each, BY_NAME[name].attributes) for name, each in shown.items()}
     import xarray as xr
 
-    return xr.Dataset(data, coords={"time": time}, attrs={**beside.attrs, "tethered": 0})
+    return xr.Dataset(data, coords={"time": time}, attrs={**other.attrs, "tethered": 0})
 
 
 def _filled(record: Record, name: str, time: np.ndarray, used: np.ndarray | None) -> np.ndarray:

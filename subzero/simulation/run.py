@@ -33,7 +33,7 @@ from subzero.engine.recording import (
     run_so_far,
 )
 from subzero.engine.run_state import Live, Setup
-from subzero.engine.time_loop import NO_ROOM, run_rows
+from subzero.engine.time_loop import NO_SPACE, run_rows
 from subzero.errors import DISTRIBUTION, UserError, whole
 from subzero.model import Model, load, model_of
 from subzero.results.dataset import PlainRun, plain_run, record_accuracy
@@ -273,7 +273,7 @@ def run_trial(
         last = min([now.behind + pace.rows, *(row + 1 for row in changes if row > start)])
         with pace:
             now = _further(now, grid, min(last, grid.times.size))
-        if now.ending == NO_ROOM:
+        if now.ending == NO_SPACE:
             if not fits_in_memory(4 * max(now.recording.tension.size, now.used)):
                 break
             live, recording = enlarged_run(now.live, now.recording, now.used)
@@ -292,7 +292,7 @@ def run_trial(
 
 def _goes_on(now: RunState, grid: Grid) -> bool:
     """Return whether a run can and may go on."""
-    return now.ending in (coupling.FINE, NO_ROOM) and not _took_too_long(now, grid)
+    return now.ending in (coupling.FINE, NO_SPACE) and not _took_too_long(now, grid)
 
 
 def _took_too_long(now: RunState, grid: Grid) -> bool:
@@ -300,7 +300,7 @@ def _took_too_long(now: RunState, grid: Grid) -> bool:
     return bool(now.live.now.iterations > grid.iterations)
 
 
-ROOM = 64
+SPARE_SEGMENTS = 64
 """Segments allocated for a run at its start beyond those in the water, more than `fig6` pays out: to enlarge the
 arrays takes half a millisecond. [-]"""
 SPARE_NODES = 64
@@ -310,7 +310,7 @@ SPARE_NODES = 64
 def _initial_run_state(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> RunState:
     """Return a run at its start, of which no row is written yet."""
     longest = float(np.diff(grid.times).max()) / grid.parts
-    setup, live = prepare(trial, model, tethered, longest_exchange=longest, room=ROOM)
+    setup, live = prepare(trial, model, tethered, longest_exchange=longest, spare=SPARE_SEGMENTS)
     setup.fixed.booked = grid.booked
     rows = row_of(grid.times.size - 1, grid.stride) + 1
     each = min(4 * live.line.length.size, 2 * most_segments(trial, model) + SPARE_NODES)
@@ -355,7 +355,7 @@ def in_words(ending: int, time: float, setup: Setup, live: Live) -> str:
         return WENT_WELL
     if ending == coupling.CABLE_FAILED:
         return describe_stop(time, live.line, setup.fixed.drum, setup.fixed.cable, NAMES)
-    if ending == NO_ROOM:
+    if ending == NO_SPACE:
         return f"The cable's shapes until t = {time:g} s fill the memory that is free. {REMEDY}"
     if ending == coupling.DISAGREED:
         return (

@@ -38,7 +38,7 @@ from subzero.engine import coupling
 from subzero.engine.initial_conditions import prepare
 from subzero.engine.recording import Recording, Run, cut, new_recording, record_row
 from subzero.engine.run_state import Live, Orders, Setup
-from subzero.engine.time_loop import ENDING, NO_ROOM, ROW, USED, advance, hold, observe
+from subzero.engine.time_loop import ENDING, NO_SPACE, ROW, USED, advance, hold, observe
 from subzero.errors import UserError, real, short, suggestion
 from subzero.model import Model, load, model_of
 from subzero.simulation.run import WENT_WELL, enlarged_run, in_words
@@ -58,7 +58,7 @@ COMMANDED = ("propeller [rev/s]", "rudder [rad]", "port stern-plane [rad]", "sta
 
 MOST_EXCHANGES = 1e6
 """A sample of more cable steps than this is a slip of the pen."""
-WELL = (coupling.FINE, NO_ROOM)
+WELL = (coupling.FINE, NO_SPACE)
 """Endings of a step from which a run can go on."""
 
 
@@ -211,7 +211,7 @@ class Simulator:
             held = self._held
             count = goal - int(held.at[ROW])
             ending = advance(held.handle, held.at, count, n, rudder, port, starboard, held.seen)
-            if ending != NO_ROOM:
+            if ending != NO_SPACE:
                 break
             live, recording = enlarged_run(held.live, held.recording, int(held.at[USED]))
             self._held = Held.of(held.setup, live, recording, held.times, held.at, held.seen)

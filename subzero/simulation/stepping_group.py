@@ -13,7 +13,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from subzero.engine.time_loop import ENDING, NO_ROOM, begin, hold_batch, share
+from subzero.engine.time_loop import ENDING, NO_SPACE, begin, hold_batch, share
 from subzero.simulation.stepper import WELL, Held, Simulator
 
 
@@ -60,7 +60,7 @@ class SteppingGroup:
         self._finish()
         endings = [int(each.at[ENDING]) for each in self._held]
         for i, ending in enumerate(endings):
-            if ending == NO_ROOM:
+            if ending == NO_SPACE:
                 self._simulators[i]._reach(goals[i], *self._orders[i].tolist())
                 endings[i] = int(self._simulators[i]._held.at[ENDING])
         return [ending not in WELL for ending in endings]

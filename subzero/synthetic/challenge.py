@@ -56,7 +56,7 @@ def draw_hidden(
     if kind == "none":
         return Hidden()
     if kind == "outside":
-        return Hidden(outside=draw_unmodelled(nominal, rng))
+        return Hidden(unmodelled=draw_unmodelled(nominal, rng))
     ids = [key for key, effect in sorted(effects.items()) if effect.sudden or kind != "sudden"]
     chosen = [str(key) for key in rng.choice(ids, 2 if kind == "pair" else 1, replace=False)]
     drawn = {key: draw_effect(effects[key], rng) for key in chosen}
@@ -133,7 +133,7 @@ def _answer(
     seed: int,
 ) -> Answer:
     """Return the hidden effects as an answer in words."""
-    unmodelled = hidden.outside
+    unmodelled = hidden.unmodelled
     kind = (
         "outside"
         if unmodelled

@@ -33,18 +33,18 @@ class Hidden:
     Attributes:
         effects: effect id → deviations, on top of what the tolerances draw.
         starts: effect id → when it begins, of those that begin in mid-run. [s]
-        outside: a force that is not in the catalogue.
+        unmodelled: a force that is not in the catalogue.
     """
 
     effects: Deviations = field(default_factory=dict)
     starts: Mapping[str, float] = field(default_factory=dict)
-    outside: UnmodelledForce | None = None
+    unmodelled: UnmodelledForce | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names as in a diagnosis: ids, ``<id>@t`` for one that begins in mid-run, ``outside:<kind>``."""
         ids = tuple(f"{key}@t" if key in self.starts else key for key in self.effects)
-        return ids + ((f"outside:{self.outside.name}",) if self.outside else ())
+        return ids + ((f"outside:{self.unmodelled.name}",) if self.unmodelled else ())
 
 
 def draw_deviations(
@@ -98,7 +98,7 @@ def hide(setting: Setting, effects: Iterable[Effect], tolerances: Deviations, hi
             started = {key: hidden.effects[key] for key, at in hidden.starts.items() if at <= time}
             models.append((time, apply_all(setting, effects, tolerances, at_once, started).model))
         true = replace(true, later=tuple(models))
-    return hidden.outside.apply(true) if hidden.outside else true
+    return hidden.unmodelled.apply(true) if hidden.unmodelled else true
 
 
 def _within(rng: np.random.Generator, parameter: Parameter, tolerance: float) -> float:

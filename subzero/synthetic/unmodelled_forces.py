@@ -49,14 +49,14 @@ class UnmodelledForce:
         return replace(setting, later=((first, with_it), (last, without)))
 
 
-def force_along(outside: UnmodelledForce, setting: Setting, truth: Truth) -> np.ndarray:
+def force_along(unmodelled: UnmodelledForce, setting: Setting, truth: Truth) -> np.ndarray:
     """Return the force (n, 6) at the times of a truth of the setting, which a diagnosis should recover. [N, N m]"""
     times, factors = truth.run.times, factors_of(setting, truth)
-    total = history_at(outside.missing, times)
-    for term in outside.missing.terms:
+    total = history_at(unmodelled.missing, times)
+    for term in unmodelled.missing.terms:
         total[:, AXES.index(term.axis)] += term.coefficient * feature_value(term.feature, factors)
-    if outside.window is not None:
-        inside = (times >= outside.window[0] - 1e-9) & (times <= outside.window[1] + 1e-9)
+    if unmodelled.window is not None:
+        inside = (times >= unmodelled.window[0] - 1e-9) & (times <= unmodelled.window[1] + 1e-9)
         total[~inside] = 0.0
     return total
 

@@ -18,7 +18,7 @@ from subzero.cli.app import FINE, INTERRUPTED, MISTAKE, main
 from subzero.diagnosis import (
     CAUSE_NAMED,
     NOTHING_WRONG,
-    OUTSIDE,
+    OUT_OF_CATALOGUE,
     Curves,
     Detectability,
     Estimate,
@@ -104,7 +104,9 @@ def test_a_diagnosis_tells_the_verdict_then_what_cannot_be_told_apart_and_leaves
 )
 def test_what_is_outside_the_catalogue_is_written_and_drawn_force_or_drift(engine, tmp_path, axis, unit):
     unknown = Unknown(axis=axis, time=TIME, force=0.1 * TIME, band=0.05 + 0.0 * TIME)
-    engine["answer"] = replace(NAMED, verdict=OUTSIDE, causes=(), unknown=unknown, extended=Extended())
+    engine["answer"] = replace(
+        NAMED, verdict=OUT_OF_CATALOGUE, causes=(), unknown=unknown, extended=Extended()
+    )
     assert main(["diagnose", "record.csv", "--scenario", "fig6", "--out", "found"]) == FINE
     assert json.loads((tmp_path / "found/diagnosis.json").read_text())["unknown"]["unit"] == unit
     assert (tmp_path / "found/missing_force.png").stat().st_size > 1000

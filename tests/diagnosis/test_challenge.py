@@ -153,7 +153,7 @@ def test_every_kind_is_drawn_about_as_often_as_it_should_be():
         "none": np.mean([not hidden.names for hidden in drawn]),
         "pair": np.mean([len(hidden.effects) == 2 for hidden in drawn]),
         "sudden": np.mean([bool(hidden.starts) for hidden in drawn]),
-        "outside": np.mean([hidden.outside is not None for hidden in drawn]),
+        "outside": np.mean([hidden.unmodelled is not None for hidden in drawn]),
     }
     for kind, share in shares.items():
         assert share == pytest.approx(KIND_PROBABILITIES[kind], abs=0.06), kind

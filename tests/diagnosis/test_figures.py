@@ -18,7 +18,7 @@ import subzero
 from subzero.diagnosis import (
     CAUSE_NAMED,
     NOTHING_WRONG,
-    OUTSIDE,
+    OUT_OF_CATALOGUE,
     UNDECIDED,
     Curves,
     Misfit,
@@ -37,7 +37,7 @@ from subzero.figures.style import BLUE, Title
 from subzero.synthetic.challenge import challenge
 
 KEPT = Path(__file__).parents[2] / "benchmarks" / "diagnosis" / "kept"
-KINDS = (CAUSE_NAMED, NOTHING_WRONG, OUTSIDE, UNDECIDED)
+KINDS = (CAUSE_NAMED, NOTHING_WRONG, OUT_OF_CATALOGUE, UNDECIDED)
 TITLE = Title(words="a trial", scenario="fig6")
 TIME = np.linspace(0.0, 9.9, 100)
 
@@ -70,7 +70,7 @@ def verdict_of(row):
     probabilities = row["probabilities"]
     first = max(probabilities, key=lambda name: probabilities[name])
     unknown = None
-    if row["verdict"] == OUTSIDE:
+    if row["verdict"] == OUT_OF_CATALOGUE:
         axis = first.partition(":")[2]
         unknown = Unknown(axis=axis, time=TIME, force=np.sin(TIME), band=np.ones(TIME.size))
     causes = [
@@ -116,7 +116,7 @@ def check(row):
     if verdict.verdict == UNDECIDED:
         assert not blue
         assert f"these records cannot tell apart: {names[0]} (" in said["What is wrong"]
-    if verdict.verdict in (CAUSE_NAMED, OUTSIDE):
+    if verdict.verdict in (CAUSE_NAMED, OUT_OF_CATALOGUE):
         assert blue == names[:1]
         wrong = since(said["What is wrong"].replace(" as no cause explains", ""))
         for one in ranked[0][0].split(" + "):

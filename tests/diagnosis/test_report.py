@@ -18,7 +18,7 @@ from subzero.diagnosis import (
     DATA_ERROR,
     NOTHING_NEAR,
     NOTHING_WRONG,
-    OUTSIDE,
+    OUT_OF_CATALOGUE,
     UNDECIDED,
     ChannelGain,
     Curves,
@@ -118,7 +118,7 @@ NAMED = Verdict(
 )  # fmt: skip
 
 FORCE = Verdict(
-    verdict=OUTSIDE,
+    verdict=OUT_OF_CATALOGUE,
     sentence="A force along X that no catalogued effect explains.",
     unknown=Unknown(axis="X", time=TIME[::20], force=-0.5 / (1 + np.exp(-(TIME[::20] - 12) / 0.8)),
                     band=np.full(16, 0.05),

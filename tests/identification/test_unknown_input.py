@@ -258,10 +258,10 @@ def test_the_best_span_of_a_push_is_that_of_the_highest_density():
     """By brute force: the density of the record for every span of knots, with the covariance that this one gives it."""
     from scipy.stats import multivariate_normal
 
+    from subzero.identification.candidates import best_span
     from subzero.identification.explanation import unknown_terms
     from subzero.identification.fit import linearised, usual_levels
     from subzero.identification.problem import Problem
-    from subzero.identification.time_spans import best_span
 
     time = STEP * np.arange(61)
     y = 2.0 * np.clip(1.0 - np.abs(time - 3.0), 0.0, 1.0) + 0.1 * np.random.default_rng(3).standard_normal(61)

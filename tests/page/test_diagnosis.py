@@ -21,7 +21,7 @@ from subzero.cli.write_diagnosis import page_of_diagnosis, replayed
 from subzero.diagnosis import (
     CAUSE_NAMED,
     DATA_ERROR,
-    OUTSIDE,
+    OUT_OF_CATALOGUE,
     UNDECIDED,
     Curves,
     Estimate,
@@ -223,8 +223,8 @@ def test_what_acts_is_said_as_what_it_does(verdict: Verdict, logged: Logged) -> 
     time = np.linspace(0.0, 6.0, 13)
     rolls = Unknown(axis="K", time=time, force=-0.3 * (time > 3.0), band=np.full(13, 0.02))
     outside = dataclasses.replace(
-        verdict, verdict=OUTSIDE, causes=(), unknown=rolls, extended=Extended(), sentence="Something acts on K.",
-        probabilities={"unknown_force:K": 0.98, "none": 0.02},
+        verdict, verdict=OUT_OF_CATALOGUE, causes=(), unknown=rolls, extended=Extended(),
+        sentence="Something acts on K.", probabilities={"unknown_force:K": 0.98, "none": 0.02},
     )  # fmt: skip
     read = Reader(page_of(outside, logged))
     assert "Something rolls the hull to port, and no cause of the catalogue explains it" in read.text

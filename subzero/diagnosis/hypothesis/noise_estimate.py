@@ -43,7 +43,7 @@ MOST_WHITE, SEEN_WHITE = 3.0, 1.5
 """σ_w is at most so many usual levels, or so many times the estimate from second differences of the residual. [-]"""
 RATIOS, TIMES, LEVELS = (0.1, 0.5, 1.0, 3.0), 6, (0.4, 1.0, 2.5)
 """Grid of starts: σ_s/σ_w, number of τ_s, and level over that of the residual. [-]"""
-BEGUN = 2
+STARTS = 2
 """Number of starts, the best ones, that are refined."""
 FIRST_MOVE, FIRST_MOVE_OF_0 = 0.05, 0.00025
 """In each other corner of the first simplex one number is larger by this share; or has this size if it is 0. [-]"""
@@ -77,7 +77,7 @@ class NoiseSearch(NamedTuple):
         rounding: q²/12.
         prior: of log σ_w, log σ_s, log τ_s.
         low, high: their bounds (3,).
-        room: work space (n + 3, n + 1).
+        work: work space (n + 3, n + 1).
     """
 
     steps: np.ndarray
@@ -86,7 +86,7 @@ class NoiseSearch(NamedTuple):
     prior: Prior
     low: np.ndarray
     high: np.ndarray
-    room: np.ndarray
+    work: np.ndarray
 
 
 def estimate(
@@ -109,9 +109,9 @@ def estimate(
     r, F = behind.residual, _felt_directions(behind.J * np.sqrt(behind.D), usual.level)
     steps, both = np.diff(time, append=time[-1:]), np.column_stack([F, r])
     # One work space for all evaluations, as compiled code allocates nothing.
-    room = np.empty((both.shape[1] + 2, both.shape[1]))
+    work = np.empty((both.shape[1] + 2, both.shape[1]))
     sought = NoiseSearch(
-        steps, both, usual.resolution**2 / 12.0, prior_of(usual), *_bounds(time, r, usual), room
+        steps, both, usual.resolution**2 / 12.0, prior_of(usual), *_bounds(time, r, usual), work
     )
     starts = _starts(time, r, F, usual)
     if known is not None:
@@ -121,7 +121,7 @@ def estimate(
     costs = np.empty(len(starts))
     costs_of(sought, starts, costs)
     started = {
-        *np.argsort(costs, kind="stable")[:BEGUN].tolist(),
+        *np.argsort(costs, kind="stable")[:STARTS].tolist(),
         *([] if known is None else [len(starts) - 1]),
     }
     for i in started:
@@ -141,7 +141,7 @@ def _cost(sought: NoiseSearch, log: np.ndarray) -> float:
     """Return minus the log density of log σ_w, log σ_s, log τ_s (3,), up to a constant."""
     white, slow, lasts = np.exp(log[0]), np.exp(log[1]), np.exp(log[2])
     unrelated = white * white + sought.rounding
-    likelihood = log_marginal(sought.steps, unrelated, slow * slow, lasts, sought.both, sought.room)
+    likelihood = log_marginal(sought.steps, unrelated, slow * slow, lasts, sought.both, sought.work)
     return -likelihood - log_density(log, sought.prior)
 
 
@@ -310,7 +310,7 @@ def _starts(at: np.ndarray, r: np.ndarray, F: np.ndarray, usual: SensorPrior) ->
 
 @compiled
 def log_marginal(
-    steps: np.ndarray, unrelated: float, slow: float, lasts: float, both: np.ndarray, room: np.ndarray
+    steps: np.ndarray, unrelated: float, slow: float, lasts: float, both: np.ndarray, work: np.ndarray
 ) -> float:
     """Return log N(r; 0, F Fᵀ + Σ), up to a constant: −½ (xᵀx − |L⁻¹ Gᵀx|²) − log det L − ½ log det Σ, with x and G
     the whitened r and F, and L Lᵀ = I + Gᵀ G.
@@ -321,10 +321,10 @@ def log_marginal(
         slow: σ_s².
         lasts: τ_s. [s]
         both: F and, in the last column, r (m, n + 1).
-        room: work space (n + 3, n + 1).
+        work: work space (n + 3, n + 1).
     """
     many = both.shape[1]
-    expected, white, inner = room[many], room[many + 1], room[:many]
+    expected, white, inner = work[many], work[many + 1], work[:many]
     expected[:] = 0.0
     inner[:] = 0.0
     left, log_scale, kept = slow, 0.0, 0.0

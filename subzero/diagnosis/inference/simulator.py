@@ -36,7 +36,7 @@ from subzero.engine import coupling
 from subzero.engine.coupling import FINE, exchange, hull_steps
 from subzero.engine.external_wrench import row_at, sample_current
 from subzero.engine.initial_conditions import go_on_with, most_hull_steps, prepare
-from subzero.engine.time_loop import NO_ROOM, SPARE
+from subzero.engine.time_loop import NO_SPACE, SPARE
 from subzero.jit import compiled, inner
 from vehicle import STATE_SIZE
 
@@ -46,8 +46,8 @@ if TYPE_CHECKING:
     from subzero.model import Model
 
 
-TOO_LONG = NO_ROOM + 1
-"""Ending of a simulation that exceeds its limit of work, in addition to the endings of `coupling` and `NO_ROOM`."""
+TOO_LONG = NO_SPACE + 1
+"""Ending of a simulation that exceeds its limit of work, in addition to the endings of `coupling` and `NO_SPACE`."""
 USUAL_WORK = 25 * 60
 """Work allowed to any simulation for an exchange, on average: iterations of the cable's solver times nodes. Usual
 simulations take 2 to 5 iterations, those of a cause of any size up to 18, for 15 to 60 nodes. Where several numbers
@@ -75,14 +75,14 @@ def record_track(
         most_work: allowed since the start of the simulation, as in `work`.
 
     Returns:
-        the exchanges that are done, and how it ended (`coupling.FINE` …, `NO_ROOM`, `TOO_LONG`).
+        the exchanges that are done, and how it ended (`coupling.FINE` …, `NO_SPACE`, `TOO_LONG`).
     """
     steps = hull_steps(setup, times[1] - times[0])
     if first == 1:
         _write(setup, live, 0.0, live.state, track[0])
     for row in range(first, last):
         if live.line.ends.count + 1 + SPARE > live.line.length.size:
-            return row, NO_ROOM
+            return row, NO_SPACE
         span = times[row] - times[row - 1]
         ending = exchange(setup, live, times[row - 1], span)
         if ending != FINE:
@@ -191,7 +191,7 @@ def _prepared(setting: Setting) -> tuple[Stop, np.ndarray, int]:
     # Even segments, whatever the initial length: with a mesh that changes with the length the response has no slope.
     nodes = 16 + int(FASTEST_PAY_OUT * trial.duration / trial.segment_length)
     setup, live = prepare(
-        trial, setting.model, setting.tethered, longest_exchange=trial.cable_step, run_in=0.0, room=nodes
+        trial, setting.model, setting.tethered, longest_exchange=trial.cable_step, run_in=0.0, spare=nodes
     )
     _ease(setup)
     grid, steps = _exchanges(setting)
@@ -226,7 +226,7 @@ def _run(
     trial, (done, setup, live, track), stops = setting.trial, begin, dict[int, Stop]()
     changes = {round(time / trial.cable_step): model for time, model in setting.later}
     row, ending = done + 1, coupling.FINE
-    while row < times.size and ending in (coupling.FINE, NO_ROOM):
+    while row < times.size and ending in (coupling.FINE, NO_SPACE):
         if row - 1 in wanted and row - 1 not in stops:
             stops[row - 1] = Stop(row - 1, setup, _copied(live), track[: 1 + (row - 1) * steps])
         if row - 1 in changes:
@@ -237,7 +237,7 @@ def _run(
         ahead = (count + 1 for count in (*changes, *wanted) if count + 1 > row)
         most = math.inf if setting.most_work is None else setting.most_work * (times.size - 1)
         row, ending = record_track(setup, live, times, row, min([times.size, *ahead]), track, most)
-        if ending == NO_ROOM:
+        if ending == NO_SPACE:
             live = live._replace(line=enlarged(live.line, 2 * live.line.length.size))
     return stops
 

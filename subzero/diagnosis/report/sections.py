@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from subzero.diagnosis.report import tables, words
 from subzero.diagnosis.report.summary import summary
-from subzero.diagnosis.results import CAUSE_NAMED, OUTSIDE, UNDECIDED, Gain, Misfit, Verdict
+from subzero.diagnosis.results import CAUSE_NAMED, OUT_OF_CATALOGUE, UNDECIDED, Gain, Misfit, Verdict
 
 
 class Section(NamedTuple):
@@ -113,7 +113,9 @@ def _next_trial(verdict: Verdict) -> list[str | tables.Table]:
 
 def _extended(verdict: Verdict) -> list[str | tables.Table]:
     drifts = verdict.unknown is not None and verdict.unknown.is_drift
-    new = verdict.on_model in (CAUSE_NAMED, OUTSIDE) and (not drifts or bool(verdict.extended.deviations))
+    new = verdict.on_model in (CAUSE_NAMED, OUT_OF_CATALOGUE) and (
+        not drifts or bool(verdict.extended.deviations)
+    )
     what = "the extended model" if new else _fitted(verdict)
     return [f"extended.toml is {what}: subzero simulate SCENARIO --with extended.toml."]
 

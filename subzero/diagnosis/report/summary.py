@@ -21,7 +21,7 @@ from subzero.diagnosis.results import (
     CAUSE_NAMED,
     NOTHING_NEAR,
     NOTHING_WRONG,
-    OUTSIDE,
+    OUT_OF_CATALOGUE,
     UNDECIDED,
     Cause,
     Verdict,
@@ -98,7 +98,7 @@ def _command(verdict: Verdict, scenario: str, extended: str) -> str:
 
 def _is_new(verdict: Verdict) -> bool:
     """Say whether the extended model has anything that the nominal one has not."""
-    return verdict.on_model in (CAUSE_NAMED, OUTSIDE) and (
+    return verdict.on_model in (CAUSE_NAMED, OUT_OF_CATALOGUE) and (
         bool(verdict.extended.deviations) or verdict.extended.missing is not None
     )
 
@@ -111,7 +111,7 @@ def _wrong(verdict: Verdict) -> Iterator[str]:
         yield words.UNCHANGED
     if verdict.on_model == CAUSE_NAMED:
         yield from (words.cause_in_short(cause) for cause in verdict.causes)
-    elif verdict.on_model == OUTSIDE and verdict.unknown is not None:
+    elif verdict.on_model == OUT_OF_CATALOGUE and verdict.unknown is not None:
         yield words.unknown(verdict.unknown)
     else:
         if verdict.on_model == UNDECIDED:
@@ -143,7 +143,7 @@ def _sure(verdict: Verdict) -> Iterator[str]:
         yield f"That {error.sentence}: {_in_words(error.probability).lower()}."
     if verdict.on_model == UNDECIDED:
         yield "Not sure enough to name one of them."
-    elif verdict.on_model == OUTSIDE and probability is not None:
+    elif verdict.on_model == OUT_OF_CATALOGUE and probability is not None:
         anything = _anything_unknown(verdict)
         yield f"That something acts which is no cause of the catalogue: {_in_words(anything).lower()} " + (
             f"(probability {words.probability(anything)}); that it acts there: {words.probability(probability)}."
@@ -171,7 +171,7 @@ def _probability(verdict: Verdict) -> float | None:
     """Return the probability of the reported explanation; of several causes the lowest; None if it is not known."""
     if verdict.on_model == CAUSE_NAMED and verdict.causes:
         return min(cause.probability for cause in verdict.causes)
-    if verdict.on_model in (OUTSIDE, NOTHING_WRONG):
+    if verdict.on_model in (OUT_OF_CATALOGUE, NOTHING_WRONG):
         reported = [p for name, p in verdict.probabilities.items() if words.is_reported(name, verdict)]
         return sum(reported) if reported else None
     return None
@@ -324,7 +324,7 @@ def _next(verdict: Verdict) -> Iterator[str]:
     if verdict.on_model == CAUSE_NAMED:
         places = list(dict.fromkeys(filter(None, (_place(cause.id) for cause in verdict.causes))))
         yield from (f"Look at {place}." for place in places)
-    elif verdict.on_model == OUTSIDE and verdict.unknown is not None:
+    elif verdict.on_model == OUT_OF_CATALOGUE and verdict.unknown is not None:
         unknown = verdict.unknown
         yield (
             "Look at that sensor: its drift is corrected in the comparison, not in the record."
@@ -359,7 +359,7 @@ def _settles(verdict: Verdict) -> Iterator[str]:
     """Yield the trial or channel that would decide the open questions."""
     if verdict.next_trial is not None:
         yield words.next_trial(verdict.next_trial)
-    elif verdict.on_model == OUTSIDE:
+    elif verdict.on_model == OUT_OF_CATALOGUE:
         yield (
             "Another trial of the same kind: what comes again belongs to the vehicle, what does not was an event. "
             "A trial with other commands says what it goes with."

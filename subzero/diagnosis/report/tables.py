@@ -153,8 +153,8 @@ def _worth(found: Sequence[Rival]) -> Sequence[Rival]:
 
 def rival_in_words(rival: Rival) -> str:
     """Return a rival in words; a force or a drift in everyday words."""
-    is_outside = any(id.startswith((FORCE, DRIFT)) for id in rival.ids)
-    return explanation(_id(rival)) if is_outside else rival.sentence
+    is_unknown = any(id.startswith((FORCE, DRIFT)) for id in rival.ids)
+    return explanation(_id(rival)) if is_unknown else rival.sentence
 
 
 def _id(rival: Rival) -> str:

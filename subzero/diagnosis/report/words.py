@@ -18,7 +18,7 @@ from subzero.diagnosis.results import (
     MAX_NAMED,
     NOTHING_NEAR,
     NOTHING_WRONG,
-    OUTSIDE,
+    OUT_OF_CATALOGUE,
     UNDECIDED,
     WAVE,
     Cause,
@@ -37,7 +37,7 @@ HEADLINES = {
     NOTHING_NEAR: "Nothing comes near these records",
     CAUSE_NAMED: "The cause is named",
     UNDECIDED: "Undecided: several causes explain the records as well",
-    OUTSIDE: "Something real that is not in the catalogue",
+    OUT_OF_CATALOGUE: "Something real that is not in the catalogue",
     DATA_ERROR: "An error in the data",
 }
 
@@ -222,7 +222,7 @@ def is_reported(name: str, verdict: Verdict) -> bool:
     parts = [error for error in without_errors(name, verdict).split(" + ") if error != "none"]
     if verdict.on_model == UNDECIDED:
         return False
-    if verdict.on_model == OUTSIDE and verdict.unknown is not None:
+    if verdict.on_model == OUT_OF_CATALOGUE and verdict.unknown is not None:
         return parts == [f"{DRIFT if verdict.unknown.is_drift else FORCE}{verdict.unknown.axis}"]
     ids = sorted(part.partition("@")[0] for part in parts)
     begins = any(cause.start_time is not None for cause in verdict.causes)
@@ -235,7 +235,7 @@ def title(verdict: Verdict) -> str:
         return headline(verdict)
     if verdict.on_model == CAUSE_NAMED and verdict.causes:
         return _capital(" and ".join(each.sentence for each in verdict.causes))
-    if verdict.on_model == OUTSIDE and verdict.unknown is not None:
+    if verdict.on_model == OUT_OF_CATALOGUE and verdict.unknown is not None:
         return on_model(verdict).rstrip(".")
     return headline(verdict)
 
@@ -258,7 +258,7 @@ def on_model(verdict: Verdict) -> str:
     """Return the verdict on the model; of indistinguishable explanations only the first few."""
     if verdict.on_model == UNDECIDED:
         return _undecided(verdict)
-    if verdict.on_model == OUTSIDE and verdict.unknown is not None:
+    if verdict.on_model == OUT_OF_CATALOGUE and verdict.unknown is not None:
         unknown = verdict.unknown
         said = (
             f"the sensor of the {_spaced(unknown.axis)} drifts"

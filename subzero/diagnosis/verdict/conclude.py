@@ -33,7 +33,7 @@ from subzero.diagnosis.results import (
     DATA_ERROR,
     NOTHING_NEAR,
     NOTHING_WRONG,
-    OUTSIDE,
+    OUT_OF_CATALOGUE,
     UNDECIDED,
     Cause,
     Curves,
@@ -105,7 +105,9 @@ def concluded(asked: Asked, outcome: Outcome, detectable: tuple[Detectability, .
         best=best,
         fit=reported,
         causes=tuple(each for each in best.causes if on_model == CAUSE_NAMED and each in named),
-        unknown=next((each for each in named if on_model == OUTSIDE and each.startswith((FORCE, DRIFT))), ""),
+        unknown=next(
+            (each for each in named if on_model == OUT_OF_CATALOGUE and each.startswith((FORCE, DRIFT))), ""
+        ),
         others=_others(asked, problem, pool, best, errors),
     )
     rest = follow_up(asked, report)
@@ -157,7 +159,7 @@ def decided(
     if any(each in best.causes for each in named):
         on_model = CAUSE_NAMED
     elif any(each.startswith((FORCE, DRIFT)) for each in named):
-        on_model = UNDECIDED if is_unstable else OUTSIDE
+        on_model = UNDECIDED if is_unstable else OUT_OF_CATALOGUE
     elif not errors:
         on_model = outcome.verdict.verdict
     elif outcome.verdict.suspected:
@@ -305,7 +307,7 @@ def _sentence(
             for cause in causes
         )
         return f"{words[0].upper()}{words[1:]}."
-    if on_model == OUTSIDE and unknown:
+    if on_model == OUT_OF_CATALOGUE and unknown:
         what = (
             f"The sensor of the {unknown.axis.replace('_', ' ')} drifts"
             if unknown.is_drift

@@ -29,7 +29,7 @@ from subzero.diagnosis.results import (
     CAUSE_NAMED,
     NOTHING_NEAR,
     NOTHING_WRONG,
-    OUTSIDE,
+    OUT_OF_CATALOGUE,
     UNDECIDED,
     Curves,
     Extended,
@@ -43,7 +43,14 @@ from subzero.diagnosis.verdict.pool import Explanation
 if TYPE_CHECKING:
     from subzero.diagnosis.verdict.conclude import Asked
 
-RIVALS_DRAWN = {CAUSE_NAMED: 1, OUTSIDE: 1, NOTHING_NEAR: 1, CALIBRATED: 0, NOTHING_WRONG: 0, UNDECIDED: 5}
+RIVALS_DRAWN = {
+    CAUSE_NAMED: 1,
+    OUT_OF_CATALOGUE: 1,
+    NOTHING_NEAR: 1,
+    CALIBRATED: 0,
+    NOTHING_WRONG: 0,
+    UNDECIDED: 5,
+}
 """Verdict → number of rivals that are drawn."""
 MAX_SURVIVORS = 4
 """Most explanations that the next trial is to tell apart."""
@@ -120,7 +127,7 @@ def follow_up(asked: Asked, report: Report) -> FollowUp:
 
 def _extension(report: Report) -> tuple[Fitted, Unknown | None, Extended]:
     """Return the fit of the extended model, the unknown force or drift, and the model."""
-    if report.on_model == OUTSIDE:
+    if report.on_model == OUT_OF_CATALOGUE:
         return _of_unknown(report)
     if report.on_model == CAUSE_NAMED:
         return report.fit, None, extended_by(report.fit, report.causes)
@@ -213,7 +220,7 @@ def _survivor(problem: Problem, causes: Ids, of: Fitted) -> Survivor | None:
 def _curves(report: Report, new: Fitted) -> dict[str, Curves]:
     """Return record → curves of the nominal model, of the refits, and of the rivals that are drawn."""
     fits: dict[str, Fitted | None] = {"nominal": None, "tolerance": report.others[()]}
-    if report.on_model in (CAUSE_NAMED, OUTSIDE):
+    if report.on_model in (CAUSE_NAMED, OUT_OF_CATALOGUE):
         fits["extended"] = new
     drawn = {causes: fit for causes, fit in report.others.items() if causes}
     if report.on_model == UNDECIDED and report.best.causes and report.best.is_of_catalogue:
