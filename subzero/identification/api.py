@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from time import process_time
 from typing import NamedTuple
 
@@ -146,12 +145,11 @@ def _concluded(search: Search, held_out: Sequence[Record], outliers: Mapping[str
     best, probabilities = ranked[0], _probabilities(search, ranked)
     free = free_fit(problem, best.terms, best.values, best.linear.levels.sizes)
     near = nearness(problem, best, free)
-    marginal = _marginal(ranked, probabilities)
     own = locks(problem, best, held_out) if near.near else {}
     terms = [
-        _named(problem, best, term, marginal[_what(term)], own.get(term.id), near)
-        for term in _said(ranked, probabilities)
-        if term.kind != "tolerances"
+        _named(problem, best, said, own.get(said.term.id), near)
+        for said in _said(ranked, probabilities)
+        if said.term.kind != "tolerances"
     ]
     named = tuple(
         each for each in terms if near.near and not each.against and each.probability >= NAMED_PROBABILITY
@@ -180,39 +178,55 @@ def _probabilities(search: Search, ranked: Sequence[Fit]) -> np.ndarray:
     return np.exp(log - logsumexp([*log, search.log_unseen()]))
 
 
-def _marginal(ranked: Sequence[Fit], probabilities: np.ndarray) -> dict[str, float]:
-    """Return the probability of every term, over all explanations; an unseen term may be added to the best one. Of an
-    unknown input it is that any acts: records that show one may not tell where.
+class _Said(NamedTuple):
+    """A term of the best explanation, as it is said.
+
+    Attributes:
+        term: the term.
+        probability: that it holds, over all explanations; or that one of its alternatives does.
+        alternatives: terms that say it, the first in the best explanation.
     """
-    unseen = 1.0 - float(probabilities.sum())
-    found: dict[str, float] = {}
-    for each, p in zip((ranked[0], *ranked), (unseen, *probabilities.tolist()), strict=True):
-        for what in {_what(term) for term in each.terms}:
-            found[what] = found.get(what, 0.0) + p
-    return found
+
+    term: Term
+    probability: float
+    alternatives: tuple[Term, ...]
 
 
-def _said(ranked: Sequence[Fit], probabilities: np.ndarray) -> Iterator[Term]:
-    """Yield the terms of the best explanation; of an unknown input, its sentence names the others that may act in its
-    place, until one of them does so for sure.
+def _said(ranked: Sequence[Fit], probabilities: np.ndarray) -> Iterator[_Said]:
+    """Yield the terms of the best explanation with their probabilities.
+
+    Records that show that something changes with time, which no cause explains, may not tell what: of a single unknown
+    input or drift the probability is that any of them holds, and the others are its alternatives, the most probable
+    first, until one of them holds for sure.
     """
-    places: dict[str, float] = {}
-    sentences: dict[str, str] = {}
-    for each, p in zip(ranked, (probabilities / probabilities.sum()).tolist(), strict=True):
-        for term in (term for term in each.terms if term.kind == "unknown"):
-            places[term.target] = places.get(term.target, 0.0) + p
-            sentences.setdefault(term.target, term.sentence)
+    unseen = 1.0 - float(probabilities.sum())  # an unseen term may be added to the best explanation
+    every = list(zip((ranked[0], *ranked), (unseen, *probabilities.tolist()), strict=True))
+    own: dict[str, float] = {}
+    terms: dict[str, Term] = {}
+    for each, p in every:
+        for term in each.terms:
+            what = _what(term)
+            own[what], terms[what] = own.get(what, 0.0) + p, terms.get(what, term)
+    anything = sum(p for each, p in every if any(map(_varies, each.terms)))
+    single = sum(map(_varies, ranked[0].terms)) == 1
     for term in ranked[0].terms:
-        own = [term.target] if term.kind == "unknown" else []
-        rest = sorted(places.keys() - {term.target}, key=lambda name: -places[name])
-        while own and rest and sum(places[name] for name in own) < NAMED_PROBABILITY * sum(places.values()):
-            own.append(rest.pop(0))
-        yield replace(term, sentence=", or ".join(sentences[name] for name in own)) if own else term
+        said = [term]
+        if single and _varies(term):
+            others = [what for what, each in terms.items() if _varies(each) and what != _what(term)]
+            others.sort(key=lambda what: own[what])
+            while others and sum(own[_what(each)] for each in said) < NAMED_PROBABILITY:
+                said.append(terms[others.pop()])
+        yield _Said(term, anything if len(said) > 1 else own[_what(term)], tuple(said))
 
 
 def _what(term: Term) -> str:
-    """Return what the probability of a term is about."""
-    return term.kind if term.kind == "unknown" else term.id
+    """Return what a term says, whenever it does."""
+    return f"{term.kind}:{term.target}" if _varies(term) else term.id
+
+
+def _varies(term: Term) -> bool:
+    """Return whether a term is an unknown history: of an input, or the drift of a sensor."""
+    return term.kind in ("unknown", "drift")
 
 
 def _kind(
@@ -231,32 +245,58 @@ def _kind(
     return CALIBRATED if best.terms and not suspected and probabilities[0] >= NAMED_PROBABILITY else UNDECIDED
 
 
-def _named(
-    problem: Problem, best: Fit, term: Term, probability: float, lock: Locks | None, near: Nearness
-) -> Named:
-    against = lock.reasons if lock else ("the model is not near",) if not near.near else ()
-    gain = lock.gain if lock else None
-    if term.kind == "unknown":
-        history = _histories(problem, best, term.target)
-        return Named(term.id, term.sentence, False, probability, (), gain, against, history)
-    estimates = _estimates(problem, best, term)
-    return Named(term.id, term.sentence, term.is_data_error, probability, estimates, gain, against)
+def _named(problem: Problem, best: Fit, said: _Said, lock: Locks | None, near: Nearness) -> Named:
+    term = said.term
+    sentences = dict.fromkeys(each.sentence for each in said.alternatives)
+    history: tuple[History, ...] = ()
+    if not all(each.is_data_error for each in said.alternatives) and _varies(term):
+        history = (
+            _histories(problem, best, term.target) if term.kind == "unknown" else _drifts(problem, best, term)
+        )
+    return Named(
+        id=term.id,
+        sentence=", or ".join(sentences),
+        is_data_error=term.is_data_error and not history,
+        probability=said.probability,
+        estimates=() if term.kind == "unknown" else _estimates(problem, best, term),
+        gain=lock.gain if lock else None,
+        against=lock.reasons if lock else ("the model is not near",) if not near.near else (),
+        history=history,
+    )
+
+
+def _drifts(problem: Problem, best: Fit, term: Term) -> tuple[History, ...]:
+    """Return the drift of a channel in each record, from its beginning to its end."""
+    (drift,) = [i for i, e in enumerate(best.entries) if (e.kind, e.name) == ("drift", term.target)]
+    size, sd = 0.5 * float(best.x[drift]), 0.5 * math.sqrt(best.variance[drift])
+    unit, ends = problem.model.channels[term.target].unit, (-1.0, 1.0)
+    return tuple(
+        History(
+            each.name,
+            unit,
+            (float(each.time[0]), float(each.time[-1])),
+            tuple(end * size for end in ends),
+            (sd, sd),
+        )
+        for each in problem.records
+    )
 
 
 def _histories(problem: Problem, best: Fit, name: str) -> tuple[History, ...]:
     """Return an unknown input in each record where it acts, to the knots next to these, at which it is 0."""
     (unit,) = [each.unit for each in problem.model.unknown if each.name == name]
-    found = []
+    found, sd = [], np.sqrt(best.variance)
     for k, record in enumerate(problem.records):
-        time = problem.knots[k][name]
-        values, sd, acts = np.zeros(time.size), np.zeros(time.size), np.zeros(time.size, dtype=bool)
-        for entry, x, variance in zip(best.entries, best.x.tolist(), best.variance.tolist(), strict=True):
-            if entry.identity[:3] == ("unknown", name, k):
-                i = entry.knot
-                values[i], sd[i], acts[max(i - 1, 0) : i + 2] = x, math.sqrt(variance), True
-        rows = (tuple(row[acts].tolist()) for row in (time, values, sd))
-        if acts.any():
-            found.append(History(record.name, unit, *rows))
+        own = [i for i, e in enumerate(best.entries) if e.identity[:3] == ("unknown", name, k)]
+        if not own:
+            continue
+        time = problem.knots(k, best.entries[own[0]].intervals)
+        at = [best.entries[i].knot for i in own]
+        rows = np.zeros((2, time.size))
+        rows[:, at] = best.x[own], sd[own]
+        shown = slice(max(at[0] - 1, 0), at[-1] + 2)
+        columns = (tuple(row[shown].tolist()) for row in (time, *rows))
+        found.append(History(record.name, unit, *columns))
     return tuple(found)
 
 
@@ -386,15 +426,8 @@ def _remainder(problem: Problem, best: Fit, near: Nearness) -> str:
         return ""
     name = max(near.sizes, key=lambda each: near.sizes[each][0] / near.sizes[each][1])
     rows = []
-    for k, record in enumerate(problem.records):
-        values = np.array(
-            [
-                v
-                for e, v in zip(best.entries, best.x.tolist(), strict=True)
-                if e.identity[:3] == ("unknown", name, k)
-            ]
-        )
-        rows.append((record, np.abs(np.interp(record.time, problem.knots[k][name], values))))
+    for history, record in zip(_histories(problem, best, name), problem.records, strict=True):
+        rows.append((record, np.abs(np.interp(record.time, history.time, history.value))))
     size = np.concatenate([row for _, row in rows])
     grows = [
         (float(np.corrcoef(size, column)[0, 1]), other)

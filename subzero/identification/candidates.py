@@ -20,7 +20,6 @@ from subzero.identification.explanation import (
     Terms,
     cause_terms,
     data_terms,
-    for_a_time,
     from_time,
     input_terms,
     tolerance_term,
@@ -224,12 +223,14 @@ def _median_at_end(e: np.ndarray) -> float:
 
 
 def best_span(problem: Problem, linear: Linear, term: Term) -> Term:
-    """Return an unknown input as it acts for the time that suits the records best in the linear problem.
+    """Return an unknown input as it acts for the time that suits the records best in the linear problem, with as many
+    knots.
 
-        log p(span) = ½ hᵀ S⁻¹ h − ½ log|S| + const,   S, h: of the knots in the span, all other numbers integrated out
+        log p = ½ hᵀ S⁻¹ h − ½ log|S| + const,   S, h: of the knots in a span, all other numbers integrated out
 
-    A push that lasts for some seconds has few numbers, a history of the whole record has many, each of which costs
-    evidence. Spans have equal prior odds; those next to the best one, which say nearly the same, count with it.
+    A push that lasts for some seconds has few numbers, and so has one that grows all the time; a history of the whole
+    record has many, each of which costs evidence. Numbers of knots, and spans of each, have equal prior odds; spans
+    next to the best one, which say nearly the same, count with it.
 
     Args:
         problem: records and model.
@@ -237,37 +238,72 @@ def best_span(problem: Problem, linear: Linear, term: Term) -> Term:
         term: that it acts throughout.
     """
     own = np.array([(e.kind, e.name) == ("unknown", term.target) for e in linear.entries])
-    S, h = _without_others(problem, linear, own)
-    records = np.array([entry.record for entry in linear.entries])[own]
-    spans, gains = [], []
-    for record in np.unique(records).tolist():
-        at = np.flatnonzero(records == record)
-        for first in range(at.size):
-            L = np.linalg.cholesky(S[np.ix_(at[first:], at[first:])])
-            y = solve_triangular(L, h[at[first:]], lower=True)
-            gains.append(np.cumsum(0.5 * y**2 - np.log(np.diag(L))))
-            spans += [(record, first, last) for last in range(first, at.size)]
+    A, h = _without_others(problem, linear, own)
+    of = np.array([entry.record for entry in linear.entries])[own]
+    spans: list[Term] = []
+    gains: list[np.ndarray] = []
+    for record in np.unique(of).tolist():
+        at = np.flatnonzero(of == record)
+        counts = _halved(at.size - 1)
+        for count in counts:
+            knots, fine = problem.knots(record, count), problem.knots(record, at.size - 1)
+            hats = np.array([np.interp(fine, knots, row) for row in np.eye(count + 1)])
+            gains.append(_gains(hats @ A[np.ix_(at, at)] @ hats.T, hats @ h[at]))
+            share = 1.0 / (gains[-1].size * len(counts) * np.unique(of).size)
+            spans += _spans(problem, term, record, count, share)
     gain = np.concatenate(gains)
-    record, first, last = spans[int(np.argmax(gain))]
-    share = float(np.mean(np.exp(gain - gain.max())))
-    return _between(problem, term, record, first, last, share)
+    log = gain + np.log([span.odds for span in spans])
+    best = int(np.argmax(log))
+    return replace(spans[best], odds=float(np.sum(np.exp(log - gain[best]))))
+
+
+def _halved(intervals: int) -> list[int]:
+    """Return a number of intervals, and half of it again and again, to one."""
+    found = [intervals]
+    while found[-1] > 1:
+        found.append(found[-1] // 2)
+    return found
 
 
 def _without_others(problem: Problem, linear: Linear, own: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return (S, h) of some numbers, over the standard deviations of their priors, all others integrated out."""
+    """Return (S − I, h) of some numbers, over the standard deviations of their priors, all others integrated out."""
     A, b, *_ = Products(problem, linear.terms, linear.e, linear.J).total(linear.levels.noise)
     sd = spreads(linear.entries, linear.levels)
-    H, g = sd[:, None] * A * sd + np.eye(sd.size), sd * (b + A @ linear.off)
-    factor, across = cho_factor(H[np.ix_(~own, ~own)], lower=True), H[np.ix_(own, ~own)]
-    return H[np.ix_(own, own)] - across @ cho_solve(factor, across.T), g[own] - across @ cho_solve(
-        factor, g[~own]
+    H, g = sd[:, None] * A * sd, sd * (b + A @ linear.off)
+    factor = cho_factor(H[np.ix_(~own, ~own)] + np.eye(int((~own).sum())), lower=True)
+    across = H[np.ix_(own, ~own)]
+    return (
+        H[np.ix_(own, own)] - across @ cho_solve(factor, across.T),
+        g[own] - across @ cho_solve(factor, g[~own]),
     )
 
 
-def _between(problem: Problem, term: Term, record: int, first: int, last: int, share: float) -> Term:
-    """Return an unknown input with some of its knots; between the knots next to these it is not 0."""
-    times = problem.knots[record][term.target]
-    begins, ends = times[max(first - 1, 0)], times[min(last + 1, times.size - 1)]
+def _gains(A: np.ndarray, h: np.ndarray) -> np.ndarray:
+    """Return ½ hᵀ S⁻¹ h − ½ log|S| of all spans of knots, S = I + A: by their first knot, then by their last one."""
+    found = []
+    for first in range(h.size):
+        L = np.linalg.cholesky(A[first:, first:] + np.eye(h.size - first))
+        y = solve_triangular(L, h[first:], lower=True)
+        found.append(np.cumsum(0.5 * y**2 - np.log(np.diag(L))))
+    return np.concatenate(found)
+
+
+def _spans(problem: Problem, term: Term, record: int, count: int, share: float) -> Iterator[Term]:
+    """Yield an unknown input with all spans of some knots, each with a share of its odds; between the knots next to a
+    span it is not 0.
+    """
+    times = problem.knots(record, count).tolist()
     where = f" of {problem.records[record].name}" if len(problem.records) > 1 else ""
-    words = f"from {begins:.3g} to {ends:.3g} s{where}"
-    return for_a_time(term, record, float(times[first]), float(times[last]), share, words)
+    for first in range(count + 1):
+        for last in range(first, count + 1):
+            begins, ends = times[max(first - 1, 0)], times[min(last + 1, count)]
+            yield replace(
+                term,
+                id=f"{term.id}@{record}",
+                sentence=f"from {begins:.3g} to {ends:.3g} s{where}, {term.sentence}",
+                begins=times[first],
+                ends=times[last],
+                record=record,
+                odds=share * term.odds,
+                intervals=count,
+            )

@@ -90,6 +90,10 @@ KNOWN_ANGLES: tuple[tuple[float, float, str, str], ...] = (
 """The same for angles."""
 
 
+Identity = tuple[str, str, int, int, int]
+"""What a free number is: its kind, name, record, knot and intervals."""
+
+
 @dataclass(frozen=True)
 class Entry:
     """A free number of an explanation.
@@ -101,6 +105,7 @@ class Entry:
         centre, sd: mean and standard deviation of its prior. [its unit]
         low, high: bounds. [its unit]
         knot: of an unknown input.
+        intervals: between the knots of that input in the record.
     """
 
     kind: str
@@ -111,11 +116,12 @@ class Entry:
     low: float = -math.inf
     high: float = math.inf
     knot: int = 0
+    intervals: int = 0
 
     @property
-    def identity(self) -> tuple[str, str, int, int]:
+    def identity(self) -> Identity:
         """What it is, whatever its prior."""
-        return (self.kind, self.name, self.record, self.knot)
+        return (self.kind, self.name, self.record, self.knot, self.intervals)
 
 
 @dataclass(frozen=True)
@@ -133,6 +139,7 @@ class Term:
         begins: time from which it holds; −∞ throughout. [s]
         ends: time until which it holds. [s]
         spans: first and last times of the readings that are stuck. [s]
+        intervals: between the knots of an unknown input in its record; as many as its time asks for if 0.
         record: in which it holds; −1 in all.
         factor, offset: known values of y = offset + factor x. [-], [unit of the channel]
         size: where a search begins, in standard deviations of its numbers.
@@ -151,6 +158,7 @@ class Term:
     offset: float = 0.0
     size: float = 0.0
     spans: tuple[tuple[float, float], ...] = ()
+    intervals: int = 0
 
     @property
     def is_data_error(self) -> bool:
@@ -338,19 +346,6 @@ def input_terms(model: Model) -> list[Term]:
         )
         for a, b in pairs
     ]
-
-
-def for_a_time(term: Term, record: int, begins: float, ends: float, share: float, words: str) -> Term:
-    """Return an unknown input with its knots between two times of a record [s], with a share of its odds."""
-    return replace(
-        term,
-        id=f"{term.id}@{record}",
-        sentence=f"{words}, {term.sentence}",
-        begins=begins,
-        ends=ends,
-        record=record,
-        odds=share * term.odds,
-    )
 
 
 def from_time(term: Term, record: int, time: float, share: float) -> Term:

@@ -11,7 +11,16 @@ from types import MappingProxyType
 import numpy as np
 
 from subzero.errors import UserError
-from subzero.identification.explanation import AFFINE, CLOCK, KNOWN, Entry, Term, Terms, entries_of
+from subzero.identification.explanation import (
+    AFFINE,
+    CLOCK,
+    KNOWN,
+    Entry,
+    Identity,
+    Term,
+    Terms,
+    entries_of,
+)
 from subzero.identification.model import Model, Unknown
 from subzero.identification.noise import (
     MEDIAN_TO_SD,
@@ -92,10 +101,11 @@ class Problem:
         self,
         model: Model,
         records: Sequence[Record],
-        fixed: Mapping[tuple[str, str, int, int], float] = MappingProxyType({}),
+        fixed: Mapping[Identity, float] = MappingProxyType({}),
         before: Problem | None = None,
     ) -> None:
         self.model, self.records, self.fixed = model, list(records), fixed
+        self._hats: dict[tuple[int, int], np.ndarray] = {}
         if not self.records:
             raise UserError("there is no record. Give one, or several.")
         self.inputs = [{name: _input(record, name) for name in model.inputs} for record in self.records]
@@ -121,7 +131,7 @@ class Problem:
             own = [entry for entry in empty if _moves(entry, k)]
             run.check(self._asked(k, own, np.array([entry.centre for entry in own])))
 
-    def with_fixed(self, fixed: Mapping[tuple[str, str, int, int], float]) -> Problem:
+    def with_fixed(self, fixed: Mapping[Identity, float]) -> Problem:
         """Return the same problem with more numbers fixed; runs are shared."""
         found = copy(self)
         found.fixed = {**self.fixed, **fixed}
@@ -154,7 +164,14 @@ class Problem:
         rough = max(level, level_of(values, step))
         far = SPIKE * float(np.hypot(rough, step / np.sqrt(12.0)))
         away = self._wrapped(name, values - self._at_nominal(name, having))
-        aside = np.isfinite(values) & (~inside | spikes(values, far, sensor.turn) | spikes_at_ends(away, far))
+        alone = np.concatenate(
+            [
+                spikes(values[at], far, sensor.turn) | spikes_at_ends(away[at], far)
+                for k, _ in having
+                for at in [of == k]
+            ]
+        )
+        aside = np.isfinite(values) & (~inside | alone)
         used = finite & ~aside
         for k, _ in having:
             at = np.flatnonzero(used & (of == k))
@@ -234,7 +251,14 @@ class Problem:
             used = self.used(name, terms)
             # Where an explanation leaves more than the sensor errs, that is its own error.
             usual = max(levels[name], MEDIAN_TO_SD * float(np.median(np.abs(e[name][used]))))
-            alone = spikes(np.where(used, e[name], np.nan), SPIKE * usual, 0.0)
+            left, far = np.where(used, e[name], np.nan), SPIKE * usual
+            alone = np.concatenate(
+                [
+                    spikes(left[at], far, 0.0) | spikes_at_ends(left[at], far)
+                    for k in np.unique(each.record)
+                    for at in [each.record == k]
+                ]
+            )
             if 0 < alone.sum() <= RARE * each.used.sum():
                 found[_column(name, terms)] = alone
         return found
@@ -272,18 +296,14 @@ class Problem:
         """Duration of the longest record. [s]"""
         return max(float(np.ptp(record.time)) for record in self.records)
 
-    @cached_property
-    def knots(self) -> list[dict[str, np.ndarray]]:
-        """Of each record, unknown input → times of its knots. [s]"""
-        found = []
-        for record in self.records:
-            start, end = record.time[0], record.time[-1]
-            counts = {
-                unknown.name: int(np.clip(np.ceil((end - start) / unknown.time), 1, MAX_KNOTS)) + 1
-                for unknown in self.model.unknown
-            }
-            found.append({name: np.linspace(start, end, count) for name, count in counts.items()})
-        return found
+    def intervals_of(self, k: int, unknown: Unknown) -> int:
+        """Return how many intervals an unknown input has between its knots in record k, as its time asks for."""
+        return int(np.clip(np.ceil(np.ptp(self.records[k].time) / unknown.time), 1, MAX_KNOTS))
+
+    def knots(self, k: int, intervals: int) -> np.ndarray:
+        """Return the times of knots in record k (intervals + 1,). [s]"""
+        time = self.records[k].time
+        return np.linspace(time[0], time[-1], intervals + 1)
 
     def unknown(self, terms: Terms) -> list[Unknown]:
         """Return the unknown inputs of an explanation: the usual ones, and those that its terms say."""
@@ -299,23 +319,24 @@ class Problem:
             for number in self.model.starts
         ]
         unknown = [
-            Entry("unknown", each.name, 0.0, each.size, k, knot=i)
+            Entry("unknown", each.name, 0.0, each.size, k, knot=i, intervals=intervals)
             for k in range(len(self.records))
             for each in self.unknown(terms)
-            for i in self._acting(k, each, terms)
+            for i, intervals in self._acting(k, each, terms)
         ]
         return [self._as_fixed(entry) for entry in (*own, *starts, *unknown)]
 
-    def _acting(self, k: int, unknown: Unknown, terms: Terms) -> list[int]:
-        """Return the knots of an unknown input in record k at which an explanation lets it act."""
-        times = self.knots[k][unknown.name]
+    def _acting(self, k: int, unknown: Unknown, terms: Terms) -> list[tuple[int, int]]:
+        """Return the knots of an unknown input in record k at which an explanation lets it act, and the intervals."""
         own = [term for term in terms if term.kind == "unknown" and term.target == unknown.name]
-        spans = [(each.begins, each.ends) for each in own if each.record in (-1, k)]
-        spans += [(-np.inf, np.inf)] if unknown.usual else []
-        acts = np.zeros(times.size, dtype=bool)
-        for begins, ends in spans:
-            acts |= (times >= begins) & (times <= ends)
-        return np.flatnonzero(acts).tolist()
+        spans = [(term.intervals, term.begins, term.ends) for term in own if term.record in (-1, k)]
+        found: list[tuple[int, int]] = []
+        for intervals, begins, ends in [(0, -np.inf, np.inf)] if unknown.usual else spans:
+            count = intervals or self.intervals_of(k, unknown)
+            times = self.knots(k, count)
+            acts = np.flatnonzero((times >= begins) & (times <= ends))
+            found += [(i, count) for i in acts.tolist()]
+        return found
 
     def _as_fixed(self, entry: Entry) -> Entry:
         """Return an entry, at its value where it is fixed."""
@@ -340,15 +361,22 @@ class Problem:
     def _asked(self, k: int, entries: Sequence[Entry], x: np.ndarray) -> Asked:
         """Return the run of record k with entries at x."""
         numbers = dict(self._nominal)
-        values = {name: np.zeros(knots.size) for name, knots in self.knots[k].items()}
+        time = self.records[k].time
+        unknown = {each.name: np.zeros(time.size) for each in self.model.unknown}
         for entry, value in zip(entries, x.tolist(), strict=True):
             if entry.kind == "unknown":
-                values[entry.name][entry.knot] = value
+                unknown[entry.name] += value * self._hat(k, entry.intervals, entry.knot)
             else:
                 numbers[f"{entry.name}.since" if entry.kind == "since" else entry.name] = value
-        time = self.records[k].time
-        unknown = {name: np.interp(time, self.knots[k][name], row) for name, row in values.items()}
         return Asked(numbers, unknown)
+
+    def _hat(self, k: int, intervals: int, knot: int) -> np.ndarray:
+        """Return the function that is 1 at a knot of record k, 0 at the others, and linear in between (n,)."""
+        if (k, intervals) not in self._hats:
+            knots = self.knots(k, intervals)
+            rows = [np.interp(self.records[k].time, knots, row) for row in np.eye(intervals + 1)]
+            self._hats[k, intervals] = np.array(rows)
+        return self._hats[k, intervals][knot]
 
     @cached_property
     def _nominal(self) -> dict[str, float]:

@@ -86,13 +86,18 @@ def test_the_evidence_of_a_linear_model_is_the_density_of_its_record(problem):
     levels = Levels({"y": noise}, {"push": 1.7})
     linear = linearised(problem, (), entries, centre + 0.01, levels)
     record = problem.records[0]
-    knots = problem.knots[0]["push"]
+    knots = knots_of(problem)
     hats = np.array([np.interp(record.time, knots, row) for row in np.eye(knots.size)])
     spread = covariance(noise, record.time) + 0.3**2 + 0.2**2 * np.outer(record.time, record.time)
     spread += (1.7 * 0.2) ** 2 * hats.T @ hats
     exact = multivariate_normal.logpdf(record.columns["y"], 0.8 + 0.6 * record.time, spread)
     found = linear.evidence(problem)[1] - prior_of(problem, linear)
     assert found == pytest.approx(exact, abs=1e-6)
+
+
+def knots_of(problem):
+    """Return the times of the knots of the unknown input."""
+    return problem.knots(0, problem.intervals_of(0, problem.model.unknown[0]))
 
 
 def prior_of(problem, linear):
@@ -118,7 +123,7 @@ def test_a_step_goes_to_the_mean_of_the_posterior(problem):
     linear = linearised(problem, (), entries, np.zeros(len(entries)), Levels({"y": noise}, {"push": 1.0}))
     mean = linear.x + linear.evidence(problem)[0]
     time, y = problem.records[0].time, problem.records[0].columns["y"]
-    hats = np.array([np.interp(time, problem.knots[0]["push"], row) for row in np.eye(len(entries) - 2)])
+    hats = np.array([np.interp(time, knots_of(problem), row) for row in np.eye(len(entries) - 2)])
     J = np.column_stack([np.ones(40), time, hats.T])
     D = np.diag([0.3**2, 0.2**2, *np.full(len(entries) - 2, 0.2**2)])
     centre = np.array([entry.centre for entry in entries])
@@ -373,3 +378,22 @@ def test_a_step_is_shortened_alike_where_a_model_takes_many_sets_at_once():
         fits.append(fit(problem, linearised(problem, (), entries, np.array([4.0, 0.3, 1.0]), levels)))
     assert fits[0].x == pytest.approx(fits[1].x, rel=1e-6)
     assert fits[0].log_evidence == pytest.approx(fits[1].log_evidence, abs=0.01)
+
+
+def test_an_outlier_that_begins_a_record_beside_gaps_is_one_for_an_explanation_too():
+    """The first two readings have no two neighbours on either side; those of the record before are none."""
+    time = np.arange(40.0)
+    columns = [0.2 * time + 0.1 * np.random.default_rng(k).standard_normal(40) for k in range(2)]
+    columns[1][1] += 5.0
+    columns[1][2:4] = np.nan
+    slow = sd.Model(
+        lambda p, u, t: {"y": p["rate"] * t},
+        {"y": sd.Sensor(noise=0.1, resolution=0.0)},
+        parameters=[sd.Number("rate", 0.15, tolerance=0.1)],  # too far off to show an outlier by itself
+    )
+    problem = Problem(slow, [sd.Record(time, {"y": y}) for y in columns])
+    entries = problem.entries(())
+    e, _ = problem.residuals((), entries, [np.array([0.2])])
+    seen = np.flatnonzero(problem.outliers((), {"y": e["y"][:, 0]}).get("y", [])).tolist()
+    aside = np.flatnonzero(problem.channels["y"].spikes).tolist()
+    assert {*seen, *aside} == {41}

@@ -281,16 +281,22 @@ def test_the_best_span_of_a_push_is_that_of_the_highest_density():
         -np.abs(np.subtract.outer(time, time)) / noise.time
     )
     C += 0.05**2 * np.outer(time, time)
-    hats = np.array([np.interp(time, np.arange(7.0), row) for row in np.eye(7)])
-    spans = [(i, j) for i in range(7) for j in range(i, 7)]
-    log = np.array(
-        [
-            multivariate_normal.logpdf(y, np.zeros(61), C + hats[i : j + 1].T @ hats[i : j + 1])
-            for i, j in spans
+    spans, log, share = [], [], []
+    for count in (6, 3, 1):
+        knots = np.linspace(0.0, 6.0, count + 1)
+        own = np.array([np.interp(time, knots, row) for row in np.eye(count + 1)])
+        some = [(i, j) for i in range(count + 1) for j in range(i, count + 1)]
+        spans += [(knots[i], knots[j], count) for i, j in some]
+        log += [
+            multivariate_normal.logpdf(y, np.zeros(61), C + own[i : j + 1].T @ own[i : j + 1])
+            for i, j in some
         ]
-    )
-    assert (found.begins, found.ends) == spans[int(np.argmax(log))] == (3.0, 3.0)
-    assert found.odds == pytest.approx(term.odds * np.mean(np.exp(log - log.max())), rel=1e-6)
+        share += [1.0 / (3 * len(some))] * len(some)
+    best = int(np.argmax(np.array(log) + np.log(share)))
+    assert (found.begins, found.ends, found.intervals) == spans[best] == (3.0, 3.0, 6)
+    odds = term.odds * np.sum(np.array(share) * np.exp(np.array(log) - log[best]))
+    # Coarse knots are not all among the fine ones, from which their columns are made.
+    assert found.odds == pytest.approx(odds, rel=0.02)
     assert found.sentence.startswith("from 2 to 4 s, ")  # where it is not 0
 
 
@@ -342,3 +348,26 @@ def test_a_force_that_is_slower_than_a_short_record_is_judged_all_the_same(sampl
     assert (found.gain is None) == (samples == 12)  # too few are left to fit
     (history,) = found.history
     assert np.abs((np.array(history.value) - [0.9, 3.0]) / history.sd).max() < 3.0
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_drift_that_a_force_explains_as_well_is_no_error_in_the_data_for_sure(seed):
+    """What is shown of a lag is its push: a sensor that drifts, or a push that grows, in a straight line."""
+    time = STEP * np.arange(200)
+    model = sd.Model(
+        lambda p, u, t: {"x": p["x0"] + u["push"], "y": p["y0"] + 0.0 * t},
+        {name: sd.Sensor(noise=NOISE, unit="m", trusted=name == "y") for name in "xy"},
+        parameters=[sd.Start(f"{name}0", 0.0, tolerance=0.1) for name in "xy"],
+        unknown=[sd.Unknown("push", size=0.2, time=2.0, usual=False, sentence="something pushes it")],
+    )
+    rng = np.random.default_rng(seed)
+    record = sd.Record(
+        time, {"x": 0.01 * time + NOISE * rng.standard_normal(200), "y": NOISE * rng.standard_normal(200)}
+    )
+    verdict = sd.diagnose(record, model)
+    assert verdict.verdict == "unknown_input"
+    assert verdict.data_errors == ()
+    (found,) = verdict.named
+    assert {"something pushes it" in found.sentence, "x drifts" in found.sentence} == {True}
+    assert found.probability > 0.95
+    assert found.history[0].value[-1] - found.history[0].value[0] == pytest.approx(0.2, abs=0.02)
