@@ -160,9 +160,8 @@ class Problem:
         steps = np.diff(time)
         spread = OPEN_SPREAD if sensor.noise is None else sensor.spread
         prior = NoisePrior(level, step, float(np.median(steps[steps > 0.0])), spread)
-        # In a wrong unit readings are rougher than the sensor says.
-        rough = max(level, level_of(values, step))
-        far = SPIKE * float(np.hypot(rough, step / np.sqrt(12.0)))
+        # In a wrong unit readings are rougher than the sensor says. What is read off them has their rounding in it.
+        far = SPIKE * max(float(np.hypot(level, step / np.sqrt(12.0))), level_of(values, step))
         away = self._wrapped(name, values - self._at_nominal(name, having))
         alone = np.concatenate(
             [
