@@ -173,11 +173,6 @@ def column_name(name: str) -> str:
     return BY_NAME[name].column
 
 
-def channel_of_column(column: str) -> Channel | None:
-    """Return the channel that a CSV column holds, ``heading_deg`` → heading; None if there is none."""
-    return BY_COLUMN.get(column)
-
-
 @runtime_checkable
 class AnyRun(Protocol):
     """A run by the names of its variables: the dataset of `subzero.simulate`, or a

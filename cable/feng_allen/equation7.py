@@ -39,7 +39,6 @@ import numpy as np
 from cable.properties import CableProperties
 from subzero.jit import compiled
 
-UNKNOWNS = ("T", "Vt", "Vn", "Vb", "alpha", "beta")
 EQUATIONS = (
     "tangential momentum",
     "tangential compatibility",

@@ -36,8 +36,6 @@ CREATE TABLE IF NOT EXISTS members (
 """
 COLUMNS = "member, reason, warnings, own, scalars, channels, seconds, refinement_share"
 """Of a row, in the order of its digest, which follows them."""
-OF_THE_DISK = (sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_CANTOPEN)
-"""Errors of SQLite that are no fault of the file."""
 BLOCK = 512
 """So many members are read at a time. [-]"""
 

@@ -140,11 +140,6 @@ def _same(setting: Setting, other: Setting) -> bool:
 Ids = tuple[str, ...]
 """The causes of a hypothesis, in alphabetical order; () is "nothing is wrong"."""
 
-PRACTICAL_TOLERANCES, PRACTICAL_TOLERANCES_SUDDEN = 4.0, 2.0
-"""A deviation within so many tolerances is calibration, and no cause; calibration does not change in mid-trial, so
-that half of it is a cause there. [κτ]
-"""
-
 
 def nameable(entries: Sequence[Entry]) -> list[str]:
     """Return the ids that can be named: all but those of the start."""

@@ -415,11 +415,6 @@ def log_density(log: np.ndarray, prior: Prior) -> float:
 
 SPIKE = 5.0
 """A sample this many noise levels off the median of its neighbours is an outlier. [-]"""
-OUTLIERS_BEFORE, OUTLIER_LEVELS = (1.0, 99.0), 50.0
-"""Parameters of the Beta prior of the share of outliers, as counts of outliers and of others: one of a hundred, but a
-sensor with heavy tails may have ten times as many; width of the uniform distribution of an outlier, in usual levels.
-[-]
-"""
 
 
 NORMAL_MIDDLE, TAIL, NORMAL_TAIL = 0.6745, 0.85, 1.4395
