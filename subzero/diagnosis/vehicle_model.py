@@ -25,6 +25,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.effect import Effect, Parameter, with_onset
 from subzero.diagnosis.hypothesis.hypotheses import is_absent, moves_nothing, with_tolerances
 from subzero.diagnosis.hypothesis.logged import Logged
+from subzero.diagnosis.hypothesis.noise import KNOWN_SPREAD, USUAL_SPREAD
 from subzero.diagnosis.inference.latent_force import AXIS_WORDS, DRIFT, with_missing_force
 from subzero.diagnosis.inference.simulator import (
     Stop,
@@ -41,8 +42,6 @@ from subzero.records.consistency import REPORTED_COMMANDS
 
 OF_ANY_MODEL = ("sensor_bias", "sensor_scale", "clock_offset")
 """Effects that `Sensor` and errors in the data say."""
-KNOWN_SPREAD, USUAL_SPREAD = 0.1, 0.7
-"""Standard deviation of the logarithm of a sensor's level: given by the user, or that of usual sensors. [-]"""
 DRIFT_LEVELS, DRIFT_TIME_S = 6.0, 5.0
 """Usual size of a drift, in levels of the sensor [-], and over which time it changes [s]."""
 AFTERWARDS = ("sensors", "clock")

@@ -16,10 +16,10 @@ from types import MappingProxyType
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
-from scipy.optimize import minimize, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 from subzero.identification.explanation import Entry, Terms
-from subzero.identification.noise import Filter, Noise, log_marginal, log_times
+from subzero.identification.noise import Filter, Noise, log_times, most_probable, visible
 from subzero.identification.problem import Problem
 
 SIZE_SPREAD = 1.0
@@ -36,10 +36,6 @@ TEMPER, APPROACHING = 0.3, 0.03
 """Noise on the way from afar, over the residual; a smaller share gained of every channel ends it. [-]"""
 ENOUGH = 0.05
 """A step that gains less log posterior ends them. [nats]"""
-TIMES_TRIED = (3.0, 10.0, 50.0)
-"""Correlation times that are tried first, in sampling intervals: a short and a long one are maxima of their own. [-]"""
-INVISIBLE = 1e-3
-"""A direction that moves all readings of a channel together by less, in levels of its sensor, is none. [-]"""
 SIZE_RANGE = (-5.0, 6.0)
 """Sizes of unknown inputs that are looked at, as logarithms of their ratio to the declared one. [-]"""
 NO_SIZES: Mapping[str, float] = MappingProxyType({})
@@ -275,35 +271,18 @@ def _best_size(problem: Problem, linear: Linear, products: Products, levels: Lev
 
 def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Levels, name: str) -> Levels:
     """Return levels with the noise of a channel that has the highest evidence, given those of all others."""
-    before, prior = levels.noise[name], problem.prior(name, linear.terms)
-    times, columns = given_others(problem, linear, products, levels, name)
-
-    def at(log: np.ndarray) -> Noise:
-        white, slow, time = (np.array([before.white, before.slow, before.time]) * np.exp(log)).tolist()
-        return Noise(white, slow, time)
+    prior, (times, columns) = (
+        problem.prior(name, linear.terms),
+        given_others(problem, linear, products, levels, name),
+    )
 
     def with_noise(noise: Noise) -> Levels:
         return replace(levels, noise={**levels.noise, name: noise})
 
-    def negative(log: np.ndarray) -> float:
-        noise = at(log)
-        density = prior.log_density(noise)
-        if not np.isfinite(density):
-            return 1e300
-        density += _log_times(problem, with_noise(noise))
-        return -log_marginal(Filter.of(noise, prior.resolution, times), columns) - density
+    def log_more(noise: Noise) -> float:
+        return _log_times(problem, with_noise(noise))
 
-    lasting = np.log(
-        np.array([before.time, *(share * prior.interval for share in TIMES_TRIED)]) / before.time
-    )
-    begin = np.column_stack([np.zeros((lasting.size, 2)), lasting])
-    tried = [negative(each) for each in begin]
-    best = begin[int(np.argmin(tried))]
-    simplex = best + np.vstack([np.zeros(3), np.diag([0.3, -0.5, 0.7])])
-    options = {"initial_simplex": simplex, "maxfev": 60, "xatol": 0.2, "fatol": ENOUGH}
-    found = minimize(negative, best, method="Nelder-Mead", options=options)
-    better = found.fun <= tried[0]
-    return with_noise(at(found.x)) if better else levels
+    return with_noise(most_probable(levels.noise[name], prior, times, columns, log_more))
 
 
 def given_others(
@@ -323,10 +302,9 @@ def given_others(
     factor = np.linalg.cholesky(H)
     z = cho_solve((factor, True), sd * (b + A @ linear.off))
     K = solve_triangular(factor, (J * sd).T, lower=True).T
-    squares, V = np.linalg.eigh(K.T @ K)
-    kept = squares > (INVISIBLE * problem.levels(linear.terms)[name]) ** 2
     e0 = e + J @ (linear.off - sd * z)
-    return problem.channels[name].time[used], np.column_stack([K @ V[:, kept], e0])
+    K = visible(K, problem.levels(linear.terms)[name])
+    return problem.channels[name].time[used], np.column_stack([K, e0])
 
 
 @dataclass(frozen=True, eq=False)

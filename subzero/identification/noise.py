@@ -10,11 +10,12 @@ white (Rasmussen & Williams 2006, app. B; Hartikainen & Särkkä 2010).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import blas, lapack
+from scipy.optimize import minimize
 
 from subzero.jit import compiled
 
@@ -34,6 +35,12 @@ the usual time in this mean, in channels. [-]"""
 FLOOR_SHARE = 1e-6
 """Least level of a sensor whose noise was neither declared nor is seen, over the spread of its readings. [-]"""
 
+TIMES_TRIED = (3.0, 10.0, 50.0)
+"""Correlation times that are tried first, in sampling intervals: a short and a long one are maxima of their own. [-]"""
+SETTLED = 0.05
+"""A search for the noise ends within so much of the highest density. [nats]"""
+INVISIBLE = 1e-3
+"""A direction that moves all readings of a channel together by less, in levels of its sensor, is none. [-]"""
 MEDIAN_TO_SD = 1.4826
 """Standard deviation of normal noise, over its median absolute deviation. [-]"""
 
@@ -207,3 +214,47 @@ def log_marginal(given: Filter, columns: np.ndarray) -> float:
     # The last row of the Cholesky factor of [H b; bᵀ e₀ᵀΣ⁻¹e₀] leaves the square that w does not explain.
     diagonal = np.diag(lapack.dpotrf(G, lower=1, overwrite_a=1)[0])
     return -given.log_scale - float(np.sum(np.log(diagonal[:-1]))) - 0.5 * float(diagonal[-1]) ** 2
+
+
+def most_probable(
+    before: Noise,
+    prior: NoisePrior,
+    times: np.ndarray,
+    columns: np.ndarray,
+    log_more: Callable[[Noise], float],
+) -> Noise:
+    """Return the noise of a channel with the highest density, as far as the simplex of Nelder & Mead (1965) comes.
+
+    Args:
+        before: where the search begins; and, with other correlation times, again.
+        prior: of the sensor.
+        times: of its readings (m,). [s]
+        columns: [K e] of `log_marginal` (m, r + 1).
+        log_more: further log prior density, such as `log_times`.
+    """
+
+    def at(log: np.ndarray) -> Noise:
+        white, slow, time = (np.array([before.white, before.slow, before.time]) * np.exp(log)).tolist()
+        return Noise(white, slow, time)
+
+    def negative(log: np.ndarray) -> float:
+        noise = at(log)
+        density = prior.log_density(noise)
+        if not np.isfinite(density):
+            return 1e300
+        return -log_marginal(Filter.of(noise, prior.resolution, times), columns) - density - log_more(noise)
+
+    lasting = [before.time, *(share * prior.interval for share in TIMES_TRIED)]
+    begin = np.column_stack([np.zeros((len(lasting), 2)), np.log(np.array(lasting) / before.time)])
+    tried = [negative(each) for each in begin]
+    best = begin[int(np.argmin(tried))]
+    simplex = best + np.vstack([np.zeros(3), np.diag([0.3, -0.5, 0.7])])
+    options = {"initial_simplex": simplex, "maxfev": 60, "xatol": 0.2, "fatol": SETTLED}
+    found = minimize(negative, best, method="Nelder-Mead", options=options)
+    return at(found.x) if found.fun <= tried[0] else before
+
+
+def visible(K: np.ndarray, level: float) -> np.ndarray:
+    """Return columns (m, r) with the covariance K Kᵀ (m, k), but for directions that no reading shows."""
+    squares, V = np.linalg.eigh(K.T @ K)
+    return K @ V[:, squares > (INVISIBLE * level) ** 2]

@@ -14,20 +14,10 @@ from numpy.testing import assert_allclose
 
 import subzero
 from benchmarks.diagnosis import world
-from subzero.diagnosis.inference import (
-    CorrelationTimes,
-    Noise,
-    Observed,
-    ResidualNoise,
-    SensorPrior,
-    correlation_times_of,
-    estimate,
-    log_density,
-    log_marginal,
-    prior_of,
-    resolution_of,
-    spikes,
-)
+from subzero.diagnosis.hypothesis.noise import as_noise, prior_of
+from subzero.diagnosis.inference import Noise, Observed, resolution_of, spikes
+from subzero.identification import noise as general
+from subzero.identification.noise import log_times, most_probable, visible
 
 LEVEL = 0.3
 RECORDS = 24
@@ -74,11 +64,22 @@ def test_the_mean_of_slow_noise_scatters_as_its_covariance_says():
 
 
 def behind(random, time, noise, misfit=1.0):
-    """Return noise on top of a misfit that six parameters explain, each within its tolerance."""
+    """Return noise on top of a misfit that six parameters explain, each within its tolerance; and their J D^½."""
     J = np.column_stack([np.sin((k + 1) * time / 9.0 + k) for k in range(6)])
-    return ResidualNoise(
-        residual=noise + J @ (misfit * random.standard_normal(6)), J=J, D=np.full(6, misfit**2)
-    )
+    return noise + J @ (misfit * random.standard_normal(6)), misfit * J
+
+
+def estimate(time, residual, F, *, is_known=False):
+    """Return the most probable noise behind a fit, as `posing` has it."""
+    prior, used = prior_of(LEVEL, 0.0, time, is_known=is_known), np.ones(time.size, bool)
+    columns = np.column_stack([visible(F, LEVEL), residual])
+    found = most_probable(prior.usual(), prior, time, columns, lambda noise: times_of(noise, prior))
+    return as_noise(found, prior, time, used)
+
+
+def times_of(noise, prior):
+    """Return the log prior density of the correlation time of a channel by itself."""
+    return log_times([noise], [prior.interval])
 
 
 FAMILIES = {
@@ -99,7 +100,7 @@ def test_level_is_found_behind_what_parameters_explain(family):
     random, time, found = np.random.default_rng(3), np.arange(0.0, end, step), []
     for _ in range(RECORDS):
         noise = white * random.standard_normal(time.size) + slow(random, time, slow_sd, lasts)
-        found.append(estimate(time, behind(random, time, noise), SensorPrior(LEVEL, 0.0, is_known=False)))
+        found.append(estimate(time, *behind(random, time, noise)))
     assert_allclose(np.median([one.sd for one in found]), np.hypot(white, slow_sd), rtol=0.2)
     lasting = 2.0 * slow_sd**2 * lasts + white**2 * step
     unseen = 2.0 * (0.35 * LEVEL) ** 2  # of a slow part so small that nothing but its prior speaks of it
@@ -113,115 +114,26 @@ def dense(noise, resolution=0.0):
     return noise.slow**2 * np.exp(-apart / noise.correlation_time) + white * np.eye(noise.time.size)
 
 
-def log_prior(noise, level):
-    """Return the log density of white and slow level and correlation time of a usual sensor, but for a constant."""
-    about = [(noise.white, level, 1.5), (noise.slow, 0.7 * level, 0.5 if noise.slow > 0.7 * level else 1.0),
-             (noise.correlation_time, 1.0, 1.5)]  # fmt: skip
-    return -0.5 * sum((np.log(value / usual) / spread) ** 2 for value, usual, spread in about)
-
-
 def log_normal(values, covariance):
     """Return log N(values; 0, covariance), but for a constant."""
     return -0.5 * values @ np.linalg.solve(covariance, values) - 0.5 * np.linalg.slogdet(covariance)[1]
 
 
-def test_the_compiled_likelihood_is_that_of_the_dense_covariance_at_uneven_times():
-    random = np.random.default_rng(3)
-    time, F, r = (
-        np.sort(random.uniform(0.0, 30.0, 200)),
-        random.standard_normal((200, 5)),
-        random.standard_normal(200),
-    )
-    noise = Noise(white=0.7, slow=0.5, correlation_time=2.0, used=np.ones(200, bool), time=time)
-    found = log_marginal(
-        np.diff(time, append=time[-1]), 0.7**2, 0.5**2, 2.0, np.column_stack([F, r]), np.empty((8, 6))
-    )
-    assert_allclose(found, log_normal(r, F @ F.T + dense(noise)), rtol=1e-9)
-
-
 def test_no_noise_close_by_is_more_probable_than_what_is_found():
-    """The search ends where 0.02 more would be gained, in nats."""
+    """The search ends where 0.05 more would be gained, in nats."""
     random, time = np.random.default_rng(4), np.arange(0.0, 30.0, 0.1)
-    one = behind(random, time, slow(random, time, 0.2, 3.0) + 0.2 * random.standard_normal(time.size))
+    residual, F = behind(random, time, slow(random, time, 0.2, 3.0) + 0.2 * random.standard_normal(time.size))
+    prior = prior_of(LEVEL, 0.0, time, is_known=False)
 
     def log_posterior(noise):
-        return log_normal(one.residual, one.J * one.D @ one.J.T + dense(noise)) + log_prior(noise, LEVEL)
+        one = general.Noise(noise.white, noise.slow, noise.correlation_time)
+        return log_normal(residual, F @ F.T + dense(noise)) + prior.log_density(one) + times_of(one, prior)
 
-    found = estimate(time, one, SensorPrior(LEVEL, 0.0, False))
+    found = estimate(time, residual, F)
     for what in ("white", "slow", "correlation_time"):
         for factor in (0.8, 1.25):
             other = dataclasses.replace(found, **{what: factor * getattr(found, what)})
-            assert log_posterior(other) < log_posterior(found) + 0.02, (what, factor)
-
-
-def test_noise_that_is_looked_for_again_is_not_lost():
-    """The search begins at what is known, too: it ended 5 nats beside this one, and 12 beside that of a rudder that was
-    off, which a rival had.
-    """
-    random, time = np.random.default_rng(60), np.arange(0.0, 30.0, 0.1)
-    tails, quick, lasting = random.uniform(0.02, 1.0, 3)
-    times = 0.05 * 4.0 ** random.uniform(0.0, 2.0), 0.5 * 4.0 ** random.uniform(0.0, 2.0)
-    values = 0.3 * tails * random.standard_t(2.5, time.size)
-    values += quick * slow(random, time, 1.0, times[0]) + lasting * slow(random, time, 1.0, times[1])
-    left, usual = (
-        ResidualNoise(residual=LEVEL * values, J=np.zeros((time.size, 1)), D=np.ones(1)),
-        SensorPrior(LEVEL, 0.0, False),
-    )
-
-    def log_posterior(noise):
-        return log_normal(left.residual, dense(noise)) + log_prior(noise, LEVEL)
-
-    started = Noise(
-        white=0.1 * LEVEL, slow=0.3 * LEVEL, correlation_time=0.4, used=np.ones(300, bool), time=time
-    )
-    known = estimate(time, left, usual, started)
-    assert log_posterior(known) > log_posterior(estimate(time, left, usual)) + 1.0
-    assert log_posterior(estimate(time, left, usual, known)) > log_posterior(known) - 0.1
-
-
-def wandering(time, *lasting):
-    """Return noise of channels whose slow parts last so long [s]."""
-    used = np.ones(time.size, bool)
-    return {f"channel {i}": Noise(white=0.1, slow=0.3, correlation_time=each, used=used, time=time)
-            for i, each in enumerate(lasting)}  # fmt: skip
-
-
-def test_the_slow_parts_of_other_channels_say_how_long_that_of_one_lasts():
-    """One logger made them all. A channel that wanders by itself for seconds is less probable beside quick ones, the
-    less so the more those are alike; its own time says nothing of theirs, nor does a slow part that is hardly there.
-    """
-    time = np.arange(0.0, 30.0, 0.1)
-    noise = wandering(time, 0.2, 0.15, 0.25, 4.0)
-    found = correlation_times_of(noise)
-    quick, odd = found["channel 0"], found["channel 3"]
-    assert odd.median == pytest.approx(0.2)
-    apart = np.sum(np.log(np.array([0.75, 1.25])) ** 2)
-    assert odd.spread**2 == pytest.approx((2.0 * 0.9**2 + apart) / (2.0 + 3.0))
-    assert quick.spread > 1.5 * odd.spread
-    assert correlation_times_of(wandering(time, 0.2, 0.2)) == {}
-    none = dataclasses.replace(noise["channel 1"], slow=0.01)
-    hardly = correlation_times_of({**noise, "channel 1": none})
-    assert hardly["channel 3"].freedom == odd.freedom - 1.0 == 4.0
-    assert hardly["channel 1"] == found["channel 1"], "a channel is not beside itself"
-
-
-def test_what_is_known_of_a_time_is_a_normal_distribution_whose_variance_is_not_known():
-    """By quadrature over the variance v: 1/v has a gamma distribution of the degrees of freedom and the scale."""
-    time, freedom, scale = np.arange(0.0, 30.0, 0.1), 5.0, 0.6
-    usual = SensorPrior(LEVEL, 0.0, False, CorrelationTimes(0.2, scale, freedom))
-    log_v = np.linspace(-8.0, 12.0, 20_001)
-    v = np.exp(log_v)
-    weight = v ** (-0.5 * freedom) * np.exp(-0.5 * freedom * scale**2 / v)
-    weight /= np.sum(weight)
-    made = wandering(time, 0.2, 0.5, 4.0).values()
-    density = [np.sum(weight * np.exp(-(np.log(one.correlation_time / 0.2) ** 2) / (2.0 * v)) / np.sqrt(v))
-               for one in made]  # fmt: skip
-    alone = SensorPrior(LEVEL, 0.0, False)
-    for one, beside in zip(made, density, strict=True):
-        normal = np.exp(-(np.log(one.correlation_time) ** 2) / (2.0 * 1.5**2)) / 1.5
-        at = np.log([one.white, one.slow, one.correlation_time])
-        found = log_density(at, prior_of(usual)) - log_density(at, prior_of(alone))
-        assert found == pytest.approx(np.log(beside / normal))
+            assert log_posterior(other) < log_posterior(found) + 0.1, (what, factor)
 
 
 @pytest.mark.slow
@@ -236,11 +148,7 @@ def test_a_healthy_record_with_white_and_slow_noise_at_once_gets_no_name(index):
 def test_a_wander_of_twenty_levels_is_no_noise():
     random, time = np.random.default_rng(4), np.arange(0.0, 30.0, 0.1)
     wander = 20.0 * LEVEL * np.sin(2.0 * np.pi * time / 20.0)
-    found = estimate(
-        time,
-        behind(random, time, LEVEL * random.standard_normal(300) + wander, 1e-3),
-        SensorPrior(LEVEL, 0.0, False),
-    )
+    found = estimate(time, *behind(random, time, LEVEL * random.standard_normal(300) + wander, 1e-3))
     assert found.slow < 4.0 * LEVEL
     assert np.sum(found.whiten(wander) ** 2) > 100.0, "ten standard deviations of it still show"
 
@@ -248,7 +156,7 @@ def test_a_wander_of_twenty_levels_is_no_noise():
 def test_a_known_level_is_kept():
     random, time = np.random.default_rng(5), np.arange(0.0, 30.0, 0.1)
     noise = behind(random, time, LEVEL * random.standard_normal(300))
-    assert_allclose(estimate(time, noise, SensorPrior(LEVEL, 0.0, is_known=True)).sd, LEVEL, rtol=0.1)
+    assert_allclose(estimate(time, *noise, is_known=True).sd, LEVEL, rtol=0.1)
 
 
 @pytest.mark.parametrize("step", [1.0, 0.05, 0.1, 1e-3])
@@ -325,16 +233,3 @@ def test_two_spikes_at_the_end_of_a_record_are_no_majority():
         assert np.flatnonzero(spikes(spoilt, 0.02)).tolist() == sorted({first % 200, second % 200})
     slope = values + 0.01 * np.arange(200)
     assert not spikes(slope, 0.02).any(), "a slope of half a noise level a sample is none at the ends either"
-
-
-def standing(
-    usual: SensorPrior, white: float, slow: float, rng: np.random.Generator, place: float | None = None
-) -> tuple[np.ndarray, float]:
-    """Return what a rounded sensor shows of what stands still (200,), with noise in usual levels, and where it does."""
-    true = usual.resolution * (rng.uniform(-0.5, 0.5) if place is None else place)
-    kept = np.exp(-0.1 / 2.0)  # a slow part of 2 s
-    wander = np.cumsum(
-        kept ** -np.arange(200) * rng.standard_normal(200) * np.r_[1.0, np.full(199, np.sqrt(1 - kept**2))]
-    )
-    noisy = true + usual.level * (white * rng.standard_normal(200) + slow * wander * kept ** np.arange(200))
-    return np.round(noisy / usual.resolution) * usual.resolution, true

@@ -34,7 +34,7 @@ from subzero.diagnosis.assessment.trial_library import (
 from subzero.diagnosis.hypothesis.catalogue import START
 from subzero.diagnosis.hypothesis.catalogue.sensors import NOISE
 from subzero.diagnosis.hypothesis.hypotheses import entries_of
-from subzero.diagnosis.hypothesis.noise import SensorPrior, prior_noise
+from subzero.diagnosis.hypothesis.noise import as_noise, prior_of
 from subzero.diagnosis.inference.linear_gaussian import posterior
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import economical
@@ -93,9 +93,9 @@ def prepared_trial(problem: Problem, setting: Setting, channels: Sequence[str] =
     time = np.arange(step, setting.trial.duration + 1e-9, step)
     used = np.ones(time.size, bool)
     noise = {name: replace(each, used=used, time=time) for name, each in first.noise.items()}
-    noise |= {
-        name: prior_noise(time, used, SensorPrior(NOISE[name], 0.0, is_known=False)) for name in channels
-    }
+    for name in channels:
+        prior = prior_of(NOISE[name], 0.0, time, is_known=False)
+        noise[name] = as_noise(prior.usual(), prior, time, used)
     seen = Observed(
         name="to come",
         time=time,

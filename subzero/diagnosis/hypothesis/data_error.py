@@ -31,7 +31,7 @@ import numpy as np
 from scenarios.heading import TURN, continuous, turned
 from subzero.channels import BY_NAME, HEADING
 from subzero.diagnosis.hypothesis.logged import Logged
-from subzero.diagnosis.hypothesis.noise import sensor_prior
+from subzero.diagnosis.hypothesis.noise import step_of
 from subzero.errors import UserError
 from subzero.records.consistency import MISTAKEN, REPORTED_COMMANDS
 from subzero.records.record import Record
@@ -258,9 +258,7 @@ def _inside(logged: Logged, time: np.ndarray) -> Logged:
 def _steps(logged: Logged, channels: Iterable[str]) -> dict[str, float]:
     """Return channel → step between its values, from all samples: some are about to be put outside the trial."""
     values = logged.record.values
-    shown = {
-        name: sensor_prior(name, values[name], logged.noise, logged.steps).resolution for name in channels
-    }
+    shown = {name: step_of(name, values[name], logged.noise, logged.steps) for name in channels}
     return {**logged.steps, **shown}
 
 

@@ -4,14 +4,8 @@
     Σ_ij = (σ_w² + q²/12) δ_ij + σ_s² exp(−|t_i − t_j|/τ_s)
 
 Σ is never formed. A Kalman filter with the state x turns e into its innovations, which are white, for any times of
-the samples; AR(1) noise is the case σ_w = 0. The prior, before any fit, is
-
-    log σ_w ~ N(log ν, 1.5²),   log σ_s ~ N(log(0.7 ν + q/√12), 1² or 0.5²),   log τ_s ~ N(log 1 s, 1.5²)
-
-ν is the usual level of the sensor, or the known one; the standard deviation of log σ_s is 0.5 above its median and 1
-below. q is read off the values: sensors round. Where n other channels of a record have a visible slow part, log τ_s
-has a Student t distribution about the log of their median, with 2 + n degrees of freedom and the scale of their times
-(as of a normal distribution with unknown variance): s² = (2 · 0.9² + Σ (log τ_i − log median)²) / (2 + n).
+the samples; AR(1) noise is the case σ_w = 0. The prior, before any fit, and the estimate behind a fit are those of
+`subzero.identification.noise`; q is read off the values: sensors round.
 """
 
 from __future__ import annotations
@@ -20,14 +14,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
-from scipy.special import gammaln
 
 from subzero.diagnosis.hypothesis.catalogue.sensors import SPECS
+from subzero.identification import noise as general
+from subzero.identification.noise import NoisePrior, innovations
 from subzero.identification.noise import gains as gains_of
-from subzero.identification.noise import innovations
 from subzero.jit import compiled, scratch
 
 
@@ -162,21 +155,8 @@ def coloured(
             expected = kept[i] * (expected + gain[i] * new)
 
 
-SLOW_SHARE = 0.7
-"""Usual standard deviation of a sensor's slow part, in its usual noise levels. [-]"""
-WHITE_SPREAD, SLOW_SPREAD, SLOW_SPREAD_ABOVE, TIME_SPREAD = 1.5, 1.0, 0.5, 1.5
-"""Standard deviations of the logarithms of σ_w, σ_s and τ_s about the usual values, of σ_s below and above: a sensor
-may wander by far less than usual, but a far larger wander is an effect to be found. [-]
-"""
-USUAL_TIME = 1.0
-"""Usual correlation time of a sensor's slow part. [s]"""
-TIME_SPREAD_OF_OTHERS, SPREAD_WEIGHT, FEWEST_CHANNELS, SEEN_SLOW = 0.9, 2, 2, 0.3
-"""Prior standard deviation of log τ_s about the median of other channels; its weight, in channels; and the condition
-for it: so many others have a slow part of at least this share of σ_w. Channels of a record share a logger, and often
-a filter; how similar they are is estimated, too. [-]
-"""
-KNOWN_SPREAD = 0.1
-"""Standard deviation of the logarithm of a level that the user knows. [-]"""
+KNOWN_SPREAD, USUAL_SPREAD = 0.1, 0.7
+"""Standard deviation of the logarithm of a level that the user knows, and of that of a usual sensor. [-]"""
 FEWEST = 8
 """From fewer different values than this no step of rounding is inferred."""
 WHOLE, MOSTLY, FEW_WRONG = 0.02, 0.98, 0.25
@@ -193,27 +173,6 @@ one or two differences smaller than the step of the sensor: so many are tried.
 """
 
 
-class CorrelationTimes(NamedTuple):
-    """Correlation times of the noise of the other channels: their median [s], the scale of a logarithm about that of
-    the median [-], and the degrees of freedom of this scale.
-    """
-
-    median: float
-    spread: float
-    freedom: float
-
-
-class SensorPrior(NamedTuple):
-    """The prior of a sensor: level ν and resolution q, in the channel's unit, whether the level is known, and the
-    correlation times of the other sensors, None if too few are known.
-    """
-
-    level: float
-    resolution: float
-    is_known: bool
-    correlation_times_of: CorrelationTimes | None = None
-
-
 NOT_KNOWN: Mapping[str, float] = MappingProxyType({})
 """Default for the steps of channels: all are read off the values."""
 
@@ -224,33 +183,39 @@ def level_of(channel: str, known: Mapping[str, float]) -> float:
 
 
 def sensor_prior(
-    channel: str, values: np.ndarray, known: Mapping[str, float], steps: Mapping[str, float] = NOT_KNOWN
-) -> SensorPrior:
+    channel: str,
+    time: np.ndarray,
+    values: np.ndarray,
+    known: Mapping[str, float],
+    steps: Mapping[str, float] = NOT_KNOWN,
+) -> NoisePrior:
     """Return the prior of a channel's sensor, before any fit: its level as known or usual, its resolution as read off
     its values (n,), or off more of them before: channel → step.
     """
-    level = level_of(channel, known)
-    step = steps[channel] if channel in steps else resolution_of(values, level)
-    return SensorPrior(level, step, channel in known)
+    step = step_of(channel, values, known, steps)
+    return prior_of(level_of(channel, known), step, time, is_known=channel in known)
 
 
-def prior_noise(time: np.ndarray, used: np.ndarray, usual: SensorPrior) -> Noise:
-    """Return the noise of a usual sensor, before any fit.
+def step_of(
+    channel: str, values: np.ndarray, known: Mapping[str, float], steps: Mapping[str, float]
+) -> float:
+    """Return the step between values of a channel (n,), as known or as they show it."""
+    return steps[channel] if channel in steps else resolution_of(values, level_of(channel, known))
 
-    Args:
-        time: of the samples (n,). [s]
-        used: which of them are used (n,).
-        usual: the prior of the sensor.
-    """
-    # A known level is that of both parts together, in their usual ratio; the usual level is that of the white part.
-    slow = usual.level if usual.is_known else slow_usual(usual)
-    share = SLOW_SHARE / np.sqrt(1.0 + SLOW_SHARE**2) if usual.is_known else 1.0
-    white = np.sqrt(max(1.0 - share**2, 0.0)) * usual.level if usual.is_known else usual.level
+
+def prior_of(level: float, resolution: float, time: np.ndarray, *, is_known: bool) -> NoisePrior:
+    """Return the prior of a sensor of some level and resolution that is sampled at times (n,). [s]"""
+    interval = float(np.median(np.diff(time))) if time.size > 1 else 1.0
+    return NoisePrior(level, resolution, interval, KNOWN_SPREAD if is_known else USUAL_SPREAD)
+
+
+def as_noise(noise: general.Noise, prior: NoisePrior, time: np.ndarray, used: np.ndarray) -> Noise:
+    """Return a noise of samples at times (n,) [s], of which some are used (n,)."""
     return Noise(
-        white=float(white),
-        slow=float(share * slow),
-        correlation_time=USUAL_TIME,
-        resolution=usual.resolution,
+        white=noise.white,
+        slow=noise.slow,
+        correlation_time=noise.time,
+        resolution=prior.resolution,
         used=used,
         time=time[used],
     )
@@ -334,83 +299,6 @@ def _are_multiples(steps: np.ndarray, step: float, near: float, most: float) -> 
             if off > most:
                 return False
     return True
-
-
-def slow_usual(usual: SensorPrior) -> float:
-    """Return σ_s of a usual sensor, with the standard deviation of its rounding added."""
-    return SLOW_SHARE * usual.level + usual.resolution / np.sqrt(12.0)
-
-
-def correlation_times_of(noise: Mapping[str, Noise]) -> dict[str, CorrelationTimes]:
-    """Return the distribution of the other channels' correlation times for each channel; channels for which too few
-    others have a slow part are left out.
-    """
-    slow = {
-        name: each.correlation_time
-        for name, each in noise.items()
-        if each.slow**2 >= SEEN_SLOW**2 * each.unrelated
-    }
-    # Without the channel itself: its own time must not be a part of its prior.
-    others = {name: np.log([time for other, time in slow.items() if other != name]) for name in noise}
-    return {name: _about_their_median(logs) for name, logs in others.items() if logs.size >= FEWEST_CHANNELS}
-
-
-def _about_their_median(logs: np.ndarray) -> CorrelationTimes:
-    """Return the distribution of a further correlation time, given logarithms of others (n,)."""
-    median, freedom = float(np.median(logs)), SPREAD_WEIGHT + logs.size
-    variance = (SPREAD_WEIGHT * TIME_SPREAD_OF_OTHERS**2 + float(np.sum((logs - median) ** 2))) / freedom
-    return CorrelationTimes(float(np.exp(median)), float(np.sqrt(variance)), float(freedom))
-
-
-class Prior(NamedTuple):
-    """The prior of log σ_w, log σ_s, log τ_s: means, and standard deviations below and above (3,); the degrees of
-    freedom of the last, infinite for a normal distribution; the mean of the logarithm of the level, NaN if the level
-    is not known; and the log density at the means, up to a constant that all noises share.
-    """
-
-    mean: np.ndarray
-    below: np.ndarray
-    above: np.ndarray
-    freedom: float
-    level: float
-    most: float
-
-
-def prior_of(usual: SensorPrior) -> Prior:
-    """Return the prior of a usual sensor's noise."""
-    time, spread, freedom = usual.correlation_times_of or (USUAL_TIME, TIME_SPREAD, np.inf)
-    mean = np.log([usual.level, slow_usual(usual), time])
-    below, above = (np.array([WHITE_SPREAD, each, spread]) for each in (SLOW_SPREAD, SLOW_SPREAD_ABOVE))
-    level = float(mean[0]) if usual.is_known else np.nan
-    # Normalised, so that noises under priors with and without other channels can be compared.
-    most = float(np.log(TIME_SPREAD / spread)) + _log_height(freedom)
-    return Prior(mean, below, above, freedom, level, most)
-
-
-def _log_height(freedom: float) -> float:
-    """Return the log density of a Student t at its centre, over that of a normal distribution of the same scale."""
-    if np.isinf(freedom):
-        return 0.0
-    half = 0.5 * freedom
-    return float(gammaln(half + 0.5) - gammaln(half) - 0.5 * np.log(half))
-
-
-@compiled
-def log_density(log: np.ndarray, prior: Prior) -> float:
-    """Return the log density of log σ_w, log σ_s, log τ_s (3,), up to a constant."""
-    about = 0.0
-    for i in range(3):
-        apart = log[i] - prior.mean[i]
-        # A split normal distribution: its spread differs below and above the mean.
-        square = (apart / (prior.above[i] if apart > 0.0 else prior.below[i])) ** 2
-        # Only log τ_s may have a Student t distribution, with heavier tails.
-        far = i == 2 and prior.freedom < np.inf
-        about += (prior.freedom + 1.0) * np.log1p(square / prior.freedom) if far else square
-    # Not NaN: the level is known, and both parts together have to agree with it.
-    if prior.level == prior.level:
-        level = 0.5 * np.log(np.exp(2.0 * log[0]) + np.exp(2.0 * log[1]))
-        about += ((level - prior.level) / KNOWN_SPREAD) ** 2
-    return prior.most - 0.5 * about
 
 
 SPIKE = 5.0

@@ -9,7 +9,7 @@ Measured values are not changed: a correction is added to the simulation. Only w
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -29,17 +29,18 @@ from subzero.diagnosis.hypothesis.hypotheses import (
 )
 from subzero.diagnosis.hypothesis.noise import (
     Noise,
-    SensorPrior,
-    correlation_times_of,
-    prior_noise,
+    as_noise,
+    level_of,
+    prior_of,
     sensor_prior,
     spikes,
 )
-from subzero.diagnosis.hypothesis.noise_estimate import ResidualNoise, estimate
 from subzero.diagnosis.inference.map_fit import CONVERGED_GAIN_NATS, Fit, bounded_step, bounds, objective
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import economical, finer, read, respond, with_limit
 from subzero.errors import UserError
+from subzero.identification import noise as general
+from subzero.identification.noise import NoisePrior, log_times, most_probable, visible
 
 if TYPE_CHECKING:
     from subzero.diagnosis.hypothesis.effect import Effect
@@ -61,6 +62,8 @@ NOISE_LEVEL_CHANGE = 0.1
 much.
 """
 SLOW_NOISE_FACTOR = 2.0
+NOISE_ROUNDS, FEWEST_SAMPLES = 2, 8
+"""How often the noise of each channel is estimated, given that of the others; from fewer samples it is not. [-]"""
 
 
 def pose(records: Sequence[Logged], more: Iterable[Effect] = ()) -> Problem:
@@ -127,7 +130,7 @@ def _observed(trial: Logged) -> Observed:
         values[HEADING] = turned(values[HEADING], simulated[HEADING])
     noise = {
         name: _usual(
-            time, column, column - simulated[name], sensor_prior(name, column, trial.noise, trial.steps)
+            time, column, column - simulated[name], sensor_prior(name, time, column, trial.noise, trial.steps)
         )
         for name, column in values.items()
     }
@@ -136,12 +139,12 @@ def _observed(trial: Logged) -> Observed:
     )
 
 
-def _usual(time: np.ndarray, values: np.ndarray, difference: np.ndarray, usual: SensorPrior) -> Noise:
+def _usual(time: np.ndarray, values: np.ndarray, difference: np.ndarray, usual: NoisePrior) -> Noise:
     """Return a usual sensor's noise, without the outliers of measured − simulated (n,)."""
-    return prior_noise(time, _used(values, difference, usual), usual)
+    return as_noise(usual.usual(), usual, time, _used(values, difference, usual))
 
 
-def _used(values: np.ndarray, difference: np.ndarray, usual: SensorPrior) -> np.ndarray:
+def _used(values: np.ndarray, difference: np.ndarray, usual: NoisePrior) -> np.ndarray:
     """Return which samples are measured, and no outliers (n,)."""
     used = np.isfinite(values)
     used[used] = ~spikes(difference[used], max(usual.level, usual.resolution))
@@ -165,14 +168,13 @@ def with_residual_noise(
     )
     plain = replace(problem, records=tuple(replace(each, noise=_unit(each)) for each in records))
     r, J = plain.residual(z), plain.jacobian(z) if white is None else whitened_again(problem, plain, white)
-    rest, at, found = r + J @ z, 0, []
+    rest, F, at, found = r + J @ z, J * np.sqrt(D), 0, []
     for record in records:
-        noise = {}
+        columns = {}
         for name, old in record.noise.items():
-            own = slice(at, at + old.count)
-            noise[name] = _behind(record, name, ResidualNoise(residual=rest[own], J=J[own], D=D))
+            columns[name] = np.column_stack([F, rest])[at : at + old.count]
             at += old.count
-        found.append(replace(record, noise=noise, noise_times=correlation_times_of(noise)))
+        found.append(replace(record, noise=_behind(record, columns)))
     if all(
         _alike(each.noise[name], new.noise[name])
         for each, new in zip(problem.records, found, strict=True)
@@ -218,10 +220,10 @@ def _without_outliers(problem: Problem, record: int, z: np.ndarray) -> Observed:
     return replace(found, noise=noise)
 
 
-def sensor_of(record: Observed, name: str) -> SensorPrior:
+def sensor_of(record: Observed, name: str) -> NoisePrior:
     """Return the prior of a channel's sensor, from the user's knowledge of it and from the record as it was posed."""
-    level, resolution = record.known.get(name, SPECS[name].noise), record.noise[name].resolution
-    return SensorPrior(level, resolution, name in record.known, record.noise_times.get(name))
+    level, resolution = level_of(name, record.known), record.noise[name].resolution
+    return prior_of(level, resolution, record.time, is_known=name in record.known)
 
 
 def _unit(record: Observed) -> dict[str, Noise]:
@@ -229,10 +231,34 @@ def _unit(record: Observed) -> dict[str, Noise]:
     return {name: Noise(white=1.0, used=noise.used, time=noise.time) for name, noise in record.noise.items()}
 
 
-def _behind(record: Observed, name: str, behind: ResidualNoise) -> Noise:
-    """Return the noise of a channel in the residual of a fit."""
-    old = record.noise[name]
-    return replace(estimate(old.time, behind, sensor_of(record, name)), used=old.used)
+def _behind(record: Observed, columns: Mapping[str, np.ndarray]) -> dict[str, Noise]:
+    """Return the noise of the channels in the residual of a fit.
+
+        y − h(z*) + J z*  ~  N(0, J D Jᵀ + Σ),   z ~ N(0, D)
+
+    The parameters are integrated out, so that a smooth misfit that the model can follow is no noise.
+
+    Args:
+        record: as it is posed.
+        columns: channel → [J D^½, y − h(z*) + J z*] of the samples that are used (m, k + 1).
+    """
+    priors = {name: sensor_of(record, name) for name in columns}
+    found = {name: prior.usual() for name, prior in priors.items()}
+    intervals = [prior.interval for prior in priors.values()]
+    for name in [*columns] * NOISE_ROUNDS:
+        if record.noise[name].count < FEWEST_SAMPLES:
+            continue
+        prior, both = priors[name], columns[name]
+        directions = np.column_stack([visible(both[:, :-1], prior.level), both[:, -1]])
+
+        def log_more(noise: general.Noise, name: str = name) -> float:
+            return log_times([*{**found, name: noise}.values()], intervals)
+
+        found[name] = most_probable(found[name], prior, record.noise[name].time, directions, log_more)
+    return {
+        name: as_noise(each, priors[name], record.time, record.noise[name].used)
+        for name, each in found.items()
+    }
 
 
 def _alike(old: Noise, new: Noise) -> bool:

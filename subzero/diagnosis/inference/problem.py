@@ -18,7 +18,7 @@ import numpy as np
 
 from subzero.diagnosis.hypothesis.configuration import sensed, truth
 from subzero.diagnosis.hypothesis.hypotheses import Entry, grouped
-from subzero.diagnosis.hypothesis.noise import CorrelationTimes, Noise, innovations_of_each
+from subzero.diagnosis.hypothesis.noise import Noise, innovations_of_each
 from subzero.diagnosis.inference.simulator import (
     RunCache,
     Stop,
@@ -61,7 +61,6 @@ class Observed:
         setting: the nominal one, in economical steps.
         known: channel → level of noise that the user knows.
         correction: channel → correction added to the simulation (n,): the error of its economical steps, a drift.
-        noise_times: channel → the prior of the correlation times of its noise, as far as that is known.
     """
 
     name: str
@@ -71,7 +70,6 @@ class Observed:
     setting: Setting
     known: Mapping[str, float] = field(default_factory=dict)
     correction: Mapping[str, np.ndarray] = field(default_factory=dict)
-    noise_times: Mapping[str, CorrelationTimes] = field(default_factory=dict)
 
     def corrected(self, more: Mapping[str, np.ndarray]) -> Observed:
         """Return the record with more added to the correction of the simulation; the measured values are
