@@ -31,8 +31,8 @@ from subzero.diagnosis.hypothesis.catalogue import NOISE
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.inference import Noise, Problem, pose
-from subzero.diagnosis.results import Verdict
-from subzero.identification.api import UNSEEN
+from subzero.diagnosis.results import Cause, Verdict
+from subzero.identification.verdict import UNSEEN
 from subzero.model import Model
 from subzero.records.record import Record
 
@@ -278,6 +278,8 @@ def result_of(one: Drawn) -> dict[str, Any]:
 
 def _said(verdict: Verdict) -> dict[str, Any]:
     first, p = next(pair for pair in verdict.probabilities.items() if pair[0] != UNSEEN)
+    if verdict.causes:  # what is named, over all explanations
+        first, p = " + ".join(map(_name, verdict.causes)), min(cause.probability for cause in verdict.causes)
     noise = {
         name: [m.noise_sd, m.noise_slow, m.noise_time, m.resolution]
         for rows in verdict.misfit.values()
@@ -293,8 +295,13 @@ def _said(verdict: Verdict) -> dict[str, Any]:
     }
 
 
+def _name(cause: Cause) -> str:
+    """Return a cause as an explanation has it."""
+    return cause.id if cause.start_time is None else f"{cause.id}@{cause.start_time:.4g}"
+
+
 def is_right(one: Mapping[str, Any]) -> bool:
-    """Say whether the most probable is what is true."""
+    """Say whether what is named, or else the most probable explanation, is what is true."""
     return set(one["first"].split(" + ")) == set((one["cause"] or "none").split(" + "))
 
 

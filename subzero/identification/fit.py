@@ -236,7 +236,7 @@ class Linear:
         """Return the best step (n,), the log evidence with everything that is not linear, and the factor."""
         products = Products(problem, self.terms, self.e, self.J).total(self.levels.noise)
         step, evidence, factor = solve(products, self.entries, self.levels, self.off)
-        more = problem.log_jacobian(self.terms) + log_levels(problem, self.terms, self.levels)
+        more = problem.log_jacobian(self.terms, self.e) + log_levels(problem, self.terms, self.levels)
         return step, evidence + more, factor
 
 
@@ -512,7 +512,7 @@ def _moved(problem: Problem, linear: Linear, sets: Sequence[np.ndarray]) -> Iter
 
 def _negative_log_posterior(problem: Problem, linear: Linear) -> float:
     """Return −log of the posterior density at a point, up to constants."""
-    total = -problem.log_jacobian(linear.terms)
+    total = -problem.log_jacobian(linear.terms, linear.e)
     for name, e in linear.e.items():
         resolution = problem.prior(name, linear.terms).resolution
         for _, times, columns in _blocks(problem, name, linear.terms, np.empty((e.size, 0)), e):

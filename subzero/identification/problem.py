@@ -465,9 +465,13 @@ class Problem:
         """Return the errors of the readings of a channel."""
         return [term for term in terms if term.is_data_error and term.target == name and term.kind != "stuck"]
 
-    def log_jacobian(self, terms: Terms) -> float:
+    def log_jacobian(self, terms: Terms, e: Mapping[str, np.ndarray]) -> float:
         """Return log |∂(record as it should be)/∂(record)|, which makes evidences of corrected records comparable; and
         how much less probable it is that readings are equal in a row by chance than as they are stuck.
+
+        Args:
+            terms: the explanation.
+            e: channel → its residuals (m,).
         """
         total = 0.0
         for term in terms:
@@ -475,17 +479,25 @@ class Problem:
                 continue
             each = self.readings_of(term.target, terms)
             if term.kind == "stuck":
-                total -= self._log_equal(each, term)
+                total -= self._log_equal(terms, term, self.recorded(term.target, terms) - e[term.target])
             else:
                 total -= int((self.where(each, term) & each.used).sum()) * np.log(abs(term.factor))
         return float(total)
 
-    def _log_equal(self, each: Readings, term: Term) -> float:
-        """Return the log probability that readings of a time are equal, as neighbours are in the rest of the record."""
-        at = self.where(each, term)
-        inside, equal = at[1:] & at[:-1], np.diff(each.values) == 0.0
+    def _log_equal(self, terms: Terms, term: Term, simulated: np.ndarray) -> float:
+        """Return the log probability that readings of a time are equal by chance: as neighbours are in the rest of the
+        record; or, where a sensor rounds, as its step is longer than what the simulation (m,) moves.
+
+        A value that moves by d is rounded to another multiple of q with the probability d/q.
+        """
+        each, step = self.readings_of(term.target, terms), self.prior(term.target, terms).resolution
+        at, equal = self.where(each, term), np.diff(each.values) == 0.0
+        inside = at[1:] & at[:-1]
         rest = (equal[~inside].sum() + 1.0) / ((~inside).sum() + 2.0)
-        return float(equal[inside].sum() * np.log(rest))
+        chance = np.full(equal.size, rest)
+        if step > 0.0:
+            chance = np.maximum(chance, 1.0 - np.abs(np.diff(simulated)) / step)
+        return float(np.sum(np.log(chance[inside & equal])))
 
     def used(self, name: str, terms: Terms) -> np.ndarray:
         """Return which readings of a channel an explanation uses (m,)."""

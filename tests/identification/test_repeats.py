@@ -87,3 +87,19 @@ def test_readings_of_a_logger_that_is_faster_than_its_sensor_are_measurements():
     made = record()
     x = np.repeat(made.columns["x"][2::4], 4)  # each shown about its own time
     assert sd.diagnose(sd.Record(made.time, {**made.columns, "x": x}), model()).verdict == "nothing_wrong"
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_coarse_sensor_of_what_moves_quickly_at_first_and_slowly_then_has_no_error(seed):
+    """Forty steps of the sensor in the first quarter, six in the rest, so that most readings there are equal."""
+    rng, time = np.random.default_rng(seed), 0.1 * np.arange(400)
+    u = np.where(time < 10.0, 1.0 - np.cos(2.0 * np.pi * time / 5.0), 0.02 * (time - 10.0))
+    model = sd.Model(
+        lambda p, u, t: {"x": p["gain"] * u["u"]},
+        {"x": sd.Sensor(noise=0.02, unit="m", resolution=0.1)},
+        inputs=["u"],
+        parameters=[sd.Number("gain", 1.0, tolerance=0.02)],
+    )
+    x = 0.1 * np.round((u + 0.005 * rng.standard_normal(400)) / 0.1)
+    verdict = sd.diagnose(sd.Record(time, {"x": x, "u": u}), model)
+    assert (verdict.verdict, verdict.named) == ("nothing_wrong", ())
