@@ -25,7 +25,8 @@ from subzero.identification.explanation import (
     tolerance_term,
     with_term,
 )
-from subzero.identification.fit import Linear, Products, spreads
+from subzero.identification.fit import Linear, Products, quieter, spreads
+from subzero.identification.noise import Filter
 from subzero.identification.problem import Problem, Readings
 from subzero.identification.repeats import repeats
 
@@ -92,6 +93,9 @@ def _of_channel(problem: Problem, linear: Linear, name: str, own: list[Term]) ->
     e, level, turn = linear.e[name], problem.levels(linear.terms)[name], problem.model.channels[name].turn
     simulated = problem.recorded(name, linear.terms) - e
     yield from repeats(problem, name, linear.terms, simulated, data_odds(problem))
+    soft = [term for term in own if term.kind == "offset"]
+    for levels in (linear.levels, quieter(problem, linear.terms, linear.levels)) if soft else ():
+        yield from _steps(problem, replace(linear, levels=levels), name, soft[0])
     before = float(np.mean(e[used] ** 2))
     if before < (OFF_LEVELS * level) ** 2:
         return
@@ -102,8 +106,7 @@ def _of_channel(problem: Problem, linear: Linear, name: str, own: list[Term]) ->
             yield term
     if (affine := _regression(problem, name, simulated, each.values, used)) is not None:
         yield affine
-    soft = next((term for term in own if term.kind == "offset"), None)
-    for term in [*known, *([soft] if soft else [])]:
+    for term in known:
         yield from _from_some_time(each, term, e, simulated, used, level, turn)
 
 
@@ -202,24 +205,63 @@ def _from_some_time(
     level: float,
     turn: float,
 ) -> Iterator[Term]:
-    """Yield an error from the time on that fits best in each record, if there is one."""
+    """Yield a known unit from the time on that fits best in each record, if there is one."""
     for record in np.unique(each.record).tolist():
         at = np.flatnonzero(used & (each.record == record))
         if at.size < 2 * FEWEST_AFTER:
             continue
-        here = term if term.kind == "unit" else replace(term, offset=_median_at_end(e[at]))
-        now = _wrapped((each.values[at] - here.offset) / here.factor - simulated[at], turn)
+        now = _wrapped((each.values[at] - term.offset) / term.factor - simulated[at], turn)
         gain = np.minimum((e[at] / level) ** 2, CAPPED) - np.minimum((now / level) ** 2, CAPPED)
         total = np.cumsum(gain[::-1])[::-1]
         best = int(np.argmax(total))
         if FEWEST_AFTER <= best <= at.size - FEWEST_AFTER and total[best] > CAPPED:
-            kept = here if term.kind == "unit" else replace(term, offset=0.0)
-            yield from_time(kept, record, float(each.time[at[best]]), 1.0 / at.size)
+            yield from_time(term, record, float(each.time[at[best]]), 1.0 / at.size)
 
 
-def _median_at_end(e: np.ndarray) -> float:
-    """Return the median of the last quarter of residuals."""
-    return float(np.median(e[-max(e.size // 4, 1) :]))
+def _steps(problem: Problem, linear: Linear, name: str, term: Term) -> Iterator[Term]:
+    """Yield an offset of a channel from the time on that suits each record best in the linear problem, in which all
+    other numbers are free: what they bend to suit the readings would hide it.
+    """
+    each, used = problem.readings_of(name, linear.terms), problem.used(name, linear.terms)
+    (sd,) = [
+        entry.sd
+        for entry in problem.entries((replace(term, begins=0.0),))
+        if (entry.kind, entry.name) == ("step", name)
+    ]
+    for record in np.unique(each.record).tolist():
+        at = np.flatnonzero(used & (each.record == record))
+        if at.size >= 2 * FEWEST_AFTER:
+            gain = _gains_of_columns(problem, linear, name, at, np.tri(at.size), sd)
+            best = FEWEST_AFTER + int(np.argmax(gain[FEWEST_AFTER : at.size - FEWEST_AFTER]))
+            yield from_time(term, record, float(each.time[at[best]]), 1.0 / at.size)
+
+
+def _gains_of_columns(
+    problem: Problem, linear: Linear, name: str, at: np.ndarray, columns: np.ndarray, tau: float
+) -> np.ndarray:
+    """Return what a number more would gain in the linear problem, for each of some columns (r,). [nats]
+
+        ½ τ² h² / (1 + τ² A) − ½ log(1 + τ² A),   A, h: of the column, all other numbers integrated out
+
+    Args:
+        problem: records and model.
+        linear: an explanation.
+        name: of the channel.
+        at: places of its readings in a record (m,).
+        columns: what each number would add to them (m, r).
+        tau: standard deviation of its prior, whose mean is 0.
+    """
+    A, b, *_ = Products(problem, linear.terms, linear.e, linear.J).total(linear.levels.noise)
+    sd, time = spreads(linear.entries, linear.levels), problem.channels[name].time[at]
+    factor = cho_factor(sd[:, None] * A * sd + np.eye(sd.size), lower=True)
+    z = cho_solve(factor, sd * (b + A @ linear.off))
+    left = linear.e[name][at] + linear.J[name][at] @ (linear.off - sd * z)
+    filtered = Filter.of(linear.levels.noise[name], problem.prior(name, linear.terms).resolution, time)
+    white = filtered.whiten(np.column_stack([columns, linear.J[name][at] * sd, left]))
+    steps, J, e = np.split(white, [columns.shape[1], columns.shape[1] + sd.size], axis=1)
+    across = solve_triangular(factor[0], J.T @ steps, lower=True)
+    size = tau**2 * (np.sum(steps**2, axis=0) - np.sum(across**2, axis=0))
+    return 0.5 * (tau * steps.T @ e)[:, 0] ** 2 / (1.0 + size) - 0.5 * np.log1p(size)
 
 
 def best_span(problem: Problem, linear: Linear, term: Term) -> Term:

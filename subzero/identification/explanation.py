@@ -231,7 +231,7 @@ def cause_terms(model: Model, durations: Sequence[float]) -> list[Term]:
     found = []
     for cause in model.causes:
         throughout = Term(cause.id, cause.sentence, "cause", cause.id, odds)
-        sizes = cause.sizes if cause.numbers else (0.0,)
+        sizes = cause.sizes if cause.numbers else _sizes_of_change(cause, model)
         found += [replace(throughout, size=size) for size in sizes if cause.throughout]
         for k, duration in enumerate(durations if cause.onset else ()):
             late = replace(
@@ -244,6 +244,16 @@ def cause_terms(model: Model, durations: Sequence[float]) -> list[Term]:
             )
             found += [replace(late, begins=share * duration) for share in ONSET_SHARES]
     return found
+
+
+def _sizes_of_change(cause: Cause, model: Model) -> tuple[float, ...]:
+    """Return where a search for the size of a change begins: also far from a nominal value at which a number is
+    bounded, as friction, play or a limit may do nothing near it.
+    """
+    changed = [number for number in model.shared if number.name in cause.changes]
+    sides = {1.0 for each in changed if each.low == each.nominal}
+    sides |= {-1.0 for each in changed if each.high == each.nominal}
+    return (0.0, *sorted(sides))
 
 
 def unknown_terms(model: Model) -> list[Term]:

@@ -11,7 +11,7 @@ best explanation, and without the causes in it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from time import process_time
 
@@ -22,6 +22,7 @@ from subzero.identification.candidates import best_span, declared, suggested
 from subzero.identification.explanation import (
     CLOCK,
     Entry,
+    Identity,
     Term,
     Terms,
     log_prior,
@@ -506,6 +507,23 @@ class Search:
         found = [(self._linear_score(linear), linear) for linear in there if linear]
         return sorted(found, key=lambda pair: -pair[0])
 
+    def _away(
+        self, entries: Sequence[Entry], new: Term | None, known: Collection[Identity]
+    ) -> dict[Identity, float]:
+        """Return where the search for the numbers of a new term begins, if that is not at their nominal values; of
+        numbers that no term has had (not known), or that it changes.
+        """
+        if not (new and new.size):
+            return {}
+        causes = {cause.id: cause for cause in self.problem.model.causes}
+        changes = causes[new.target].changes if new.kind == "cause" else {}
+        return {
+            entry.identity: float(np.clip(entry.centre + new.size * entry.sd, entry.low, entry.high))
+            for entry in entries
+            if (entry.kind in ("cause", "delay", "rate") and entry.identity not in known)
+            or (entry.kind == "number" and entry.name in changes)
+        }
+
     def there(self, base: Linear, terms: Terms, new: Term | None = None) -> Linear | None:
         """Return another explanation, linearised at the point of a base, its new term where that begins; None if it
         cannot be simulated there.
@@ -515,13 +533,13 @@ class Search:
             entry.identity: (value, i)
             for i, (entry, value) in enumerate(zip(base.entries, base.x.tolist(), strict=True))
         }
+        away = self._away(entries, new, known)
         # Sensitivities are known along one simulation, and where a channel has readings.
-        kept = set(known) if moving(terms) == moving(base.terms) else set()
+        kept = set(known) - set(away) if moving(terms) == moving(base.terms) else set()
         fresh = [i for i, entry in enumerate(entries) if entry.identity not in kept]
         old = [i for i, entry in enumerate(entries) if entry.identity in kept]
-        x = np.array(
-            [known[entry.identity][0] if entry.identity in known else _begin(entry, new) for entry in entries]
-        )
+        begin = {identity: value for identity, (value, _) in known.items()} | away
+        x = np.array([begin.get(entry.identity, entry.centre) for entry in entries])
         found, valid = problem.residuals(terms, entries, [x])
         if not valid[0]:
             return None
@@ -535,9 +553,3 @@ class Search:
                 J[name][:, fresh] = own[name]
         levels = levels_under(problem, terms, base)
         return Linear(terms, entries, x, e, J, levels)
-
-
-def _begin(entry: Entry, term: Term | None) -> float:
-    """Return where the search for a new number begins."""
-    away = term.size * entry.sd if term and entry.kind in ("cause", "delay", "rate") else 0.0
-    return float(np.clip(entry.centre + away, entry.low, entry.high))

@@ -1,0 +1,61 @@
+"""Where a search begins: what the linear problem at the nominal model does not show.
+
+Verifies: a limit that does nothing near its nominal value is found; so is a step of a sensor that all other numbers can
+nearly make up for. Truth is the model with other numbers. Tolerance: 3 standard deviations of the verdict.
+"""
+
+import numpy as np
+import pytest
+
+import subzero.diagnosis as sd
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_limit_that_does_nothing_near_its_nominal_value_is_found(seed):
+    """An actuator whose rate is limited far below what is asked of it: near no limit, nothing changes at all."""
+
+    def limited(p, u, t):
+        rate, y, shown = 1.0 / max(p["inverse_rate"], 1e-6), 0.0, []
+        for value in p["gain"] * u["u"]:
+            y += np.clip(value - y, -0.1 * rate, 0.1 * rate)
+            shown.append(y)
+        return {"y": np.array(shown)}
+
+    model = sd.Model(
+        limited,
+        {"y": sd.Sensor(noise=0.05, resolution=0.0)},
+        inputs=["u"],
+        parameters=[
+            sd.Number("inverse_rate", 0.0, tolerance=0.01, low=0.0),
+            sd.Number("gain", 1.0, tolerance=0.02),
+        ],
+        causes=[
+            sd.Cause("slow", "the actuator is slow", changes={"inverse_rate": 1.0}),
+            sd.Cause("gain", "the gain is another", changes={"gain": 0.2}),
+        ],
+    )
+    time, rng = 0.1 * np.arange(300), np.random.default_rng(seed)
+    u = {"u": np.sin(2.0 * np.pi * time / 4.0)}  # no faster than 1.6 a second
+    y = limited({"inverse_rate": 2.0, "gain": 1.0}, u, time)["y"] + 0.05 * rng.standard_normal(300)
+    (found,) = sd.diagnose(sd.Record(time, {"y": y, **u}), model).named
+    assert found.id == "slow"
+    (size,) = found.estimates
+    assert abs(size.value - 2.0) < 3.0 * size.sd
+
+
+@pytest.mark.parametrize("at", [8.0, 15.0, 21.0])
+def test_a_step_is_found_that_other_numbers_bend_to_suit(at):
+    """A rate that is off makes up for most of a step: what is left is a saw tooth of a quarter of it."""
+    time, rng = 0.1 * np.arange(300), np.random.default_rng(4)
+    model = sd.Model(
+        lambda p, u, t: {"y": p["rate"] * t + p["curve"] * t**2 / 30.0},
+        {"y": sd.Sensor(noise=0.05, resolution=0.0)},
+        parameters=[sd.Number("rate", 0.0, tolerance=0.05), sd.Number("curve", 0.0, tolerance=0.05)],
+        causes=[sd.Cause("rate", "the rate is another", changes={"rate": 0.3})],
+    )
+    y = 0.03 * time + 0.25 * (time >= at) + 0.05 * rng.standard_normal(300)
+    (found,) = sd.diagnose(sd.Record(time, {"y": y}), model).named
+    assert found.id == "offset:y@0"
+    (size,) = found.estimates
+    assert abs(size.value - 0.25) < 3.0 * size.sd
+    assert f"from {at:.0f}" in found.sentence or f"from {at - 0.1:.1f}" in found.sentence
