@@ -44,6 +44,8 @@ SOFT = 3.0
 ANY_FACTOR = 2e-3
 """Odds that a factor and an offset are those of a regression, which saw the data, over those of any error: their priors
 reach over four decades and a thousand levels, a term's own numbers over a tenth and sixty levels about them. [-]"""
+BEGINS_TRIED = 100
+"""So many times at which an error may begin are tried at once."""
 CAPPED = 25.0
 """Squared residual, in levels of the sensor, beyond which a reading says no more about when an error begins. [-]"""
 OFF_LEVELS = 3.0
@@ -220,7 +222,7 @@ def _from_some_time(
 
 def _steps(problem: Problem, linear: Linear, name: str, term: Term) -> Iterator[Term]:
     """Yield an offset of a channel from the time on that suits each record best in the linear problem, in which all
-    other numbers are free: what they bend to suit the readings would hide it.
+    other numbers are free, if it is worth its prior there: what they bend to suit the readings would hide it.
     """
     each, used = problem.readings_of(name, linear.terms), problem.used(name, linear.terms)
     (sd,) = [
@@ -230,10 +232,18 @@ def _steps(problem: Problem, linear: Linear, name: str, term: Term) -> Iterator[
     ]
     for record in np.unique(each.record).tolist():
         at = np.flatnonzero(used & (each.record == record))
-        if at.size >= 2 * FEWEST_AFTER:
-            gain = _gains_of_columns(problem, linear, name, at, np.tri(at.size), sd)
-            best = FEWEST_AFTER + int(np.argmax(gain[FEWEST_AFTER : at.size - FEWEST_AFTER]))
-            yield from_time(term, record, float(each.time[at[best]]), 1.0 / at.size)
+        first, last = FEWEST_AFTER, at.size - FEWEST_AFTER
+        while first <= last:  # some begins, then those between the best one's neighbours
+            begins = np.unique(np.linspace(first, last, BEGINS_TRIED).astype(int))
+            columns = (np.arange(at.size)[:, None] >= begins).astype(float)
+            gains = _gains_of_columns(problem, linear, name, at, columns, sd)
+            best = int(np.argmax(gains))
+            first, last = begins[max(best - 1, 0)], begins[min(best + 1, begins.size - 1)]
+            if begins.size == begins[-1] - begins[0] + 1:
+                late = from_time(term, record, float(each.time[at[begins[best]]]), 1.0 / at.size)
+                if gains[best] > -np.log(late.odds):
+                    yield late
+                break
 
 
 def _gains_of_columns(

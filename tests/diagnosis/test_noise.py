@@ -14,8 +14,7 @@ from numpy.testing import assert_allclose
 
 import subzero
 from benchmarks.diagnosis import world
-from subzero.diagnosis.hypothesis.noise import as_noise, prior_of
-from subzero.diagnosis.inference import Noise, Observed, resolution_of, spikes
+from subzero.diagnosis.inference import Noise, Observed, as_noise, prior_of, resolution_of, spikes
 from subzero.identification import noise as general
 from subzero.identification.noise import log_times, most_probable, visible
 

@@ -32,6 +32,7 @@ from subzero.diagnosis.hypothesis.hypotheses import (
 )
 from subzero.diagnosis.hypothesis.noise import (
     Noise,
+    as_noise,
     prior_of,
     resolution_of,
     spikes,
@@ -105,6 +106,7 @@ __all__ = [
     "Quadratic",
     "RunCache",
     "SensitiveRun",
+    "as_noise",
     "bounded_step",
     "bounds",
     "broyden_update",
