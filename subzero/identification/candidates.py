@@ -6,7 +6,7 @@ all spans of time, an unknown input is tried in the one that suits the records b
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -81,23 +81,27 @@ def suggested(problem: Problem, linear: Linear, terms: list[Term]) -> list[Term]
     found += _of_inputs(problem, linear, terms)
     found += _swapped(problem, linear, terms)
     found += [_from_best_size(problem, linear, term) for term in terms if term.kind in CLOCK_KINDS]
+    quiet = quieter(problem, linear.terms, linear.levels)
+    others = [_Others(problem, replace(linear, levels=levels)) for levels in (linear.levels, quiet)]
     for name in problem.channels:
         if problem.model.channels[name].trusted:
             continue
         own = [term for term in terms if term.target == name and term.is_data_error]
-        found += _of_channel(problem, linear, name, own)
+        found += _of_channel(problem, linear, name, own, others)
     return found
 
 
-def _of_channel(problem: Problem, linear: Linear, name: str, own: list[Term]) -> Iterator[Term]:
+def _of_channel(
+    problem: Problem, linear: Linear, name: str, own: list[Term], others: Sequence[_Others]
+) -> Iterator[Term]:
     """Yield errors of a channel: known ones that bring it closer, the regression, those from some time on, runs."""
     each, used = problem.readings_of(name, linear.terms), problem.used(name, linear.terms)
     e, level, turn = linear.e[name], problem.levels(linear.terms)[name], problem.model.channels[name].turn
     simulated = problem.recorded(name, linear.terms) - e
     yield from repeats(problem, name, linear.terms, simulated, data_odds(problem))
     soft = [term for term in own if term.kind == "offset"]
-    for levels in (linear.levels, quieter(problem, linear.terms, linear.levels)) if soft else ():
-        yield from _steps(problem, replace(linear, levels=levels), name, soft[0])
+    for rest in others if soft else ():
+        yield from _steps(rest, name, soft[0])
     before = float(np.mean(e[used] ** 2))
     if before < (OFF_LEVELS * level) ** 2:
         return
@@ -220,11 +224,12 @@ def _from_some_time(
             yield from_time(term, record, float(each.time[at[best]]), 1.0 / at.size)
 
 
-def _steps(problem: Problem, linear: Linear, name: str, term: Term) -> Iterator[Term]:
+def _steps(others: _Others, name: str, term: Term) -> Iterator[Term]:
     """Yield an offset of a channel from the time on that suits each record best in the linear problem, in which all
     other numbers are free, if it is worth its prior there: what they bend to suit the readings would hide it.
     """
-    each, used = problem.readings_of(name, linear.terms), problem.used(name, linear.terms)
+    problem, terms = others.problem, others.linear.terms
+    each, used = problem.readings_of(name, terms), problem.used(name, terms)
     (sd,) = [
         entry.sd
         for entry in problem.entries((replace(term, begins=0.0),))
@@ -236,7 +241,7 @@ def _steps(problem: Problem, linear: Linear, name: str, term: Term) -> Iterator[
         while first <= last:  # some begins, then those between the best one's neighbours
             begins = np.unique(np.linspace(first, last, BEGINS_TRIED).astype(int))
             columns = (np.arange(at.size)[:, None] >= begins).astype(float)
-            gains = _gains_of_columns(problem, linear, name, at, columns, sd)
+            gains = others.gains(name, at, columns, sd)
             best = int(np.argmax(gains))
             first, last = begins[max(best - 1, 0)], begins[min(best + 1, begins.size - 1)]
             if begins.size == begins[-1] - begins[0] + 1:
@@ -246,32 +251,35 @@ def _steps(problem: Problem, linear: Linear, name: str, term: Term) -> Iterator[
                 break
 
 
-def _gains_of_columns(
-    problem: Problem, linear: Linear, name: str, at: np.ndarray, columns: np.ndarray, tau: float
-) -> np.ndarray:
-    """Return what a number more would gain in the linear problem, for each of some columns (r,). [nats]
+class _Others:
+    """The numbers of an explanation in its linear problem, integrated out: A = JᵀΣ⁻¹J, as `fit.solve` has it."""
 
-        ½ τ² h² / (1 + τ² A) − ½ log(1 + τ² A),   A, h: of the column, all other numbers integrated out
+    def __init__(self, problem: Problem, linear: Linear) -> None:
+        A, b, *_ = Products(problem, linear.terms, linear.e, linear.J).total(linear.levels.noise)
+        self.problem, self.linear, self.sd = problem, linear, spreads(linear.entries, linear.levels)
+        self.factor = cho_factor(self.sd[:, None] * A * self.sd + np.eye(self.sd.size), lower=True)
+        self.step = linear.off - self.sd * cho_solve(self.factor, self.sd * (b + A @ linear.off))
 
-    Args:
-        problem: records and model.
-        linear: an explanation.
-        name: of the channel.
-        at: places of its readings in a record (m,).
-        columns: what each number would add to them (m, r).
-        tau: standard deviation of its prior, whose mean is 0.
-    """
-    A, b, *_ = Products(problem, linear.terms, linear.e, linear.J).total(linear.levels.noise)
-    sd, time = spreads(linear.entries, linear.levels), problem.channels[name].time[at]
-    factor = cho_factor(sd[:, None] * A * sd + np.eye(sd.size), lower=True)
-    z = cho_solve(factor, sd * (b + A @ linear.off))
-    left = linear.e[name][at] + linear.J[name][at] @ (linear.off - sd * z)
-    filtered = Filter.of(linear.levels.noise[name], problem.prior(name, linear.terms).resolution, time)
-    white = filtered.whiten(np.column_stack([columns, linear.J[name][at] * sd, left]))
-    steps, J, e = np.split(white, [columns.shape[1], columns.shape[1] + sd.size], axis=1)
-    across = solve_triangular(factor[0], J.T @ steps, lower=True)
-    size = tau**2 * (np.sum(steps**2, axis=0) - np.sum(across**2, axis=0))
-    return 0.5 * (tau * steps.T @ e)[:, 0] ** 2 / (1.0 + size) - 0.5 * np.log1p(size)
+    def gains(self, name: str, at: np.ndarray, columns: np.ndarray, tau: float) -> np.ndarray:
+        """Return what a number more would gain, for each of some columns (r,). [nats]
+
+            ½ τ² h² / (1 + τ² A) − ½ log(1 + τ² A),   A, h: of the column, all other numbers integrated out
+
+        Args:
+            name: of the channel.
+            at: places of its readings in a record (m,).
+            columns: what each number would add to them (m, r).
+            tau: standard deviation of its prior, whose mean is 0.
+        """
+        problem, linear = self.problem, self.linear
+        time, resolution = problem.channels[name].time[at], problem.prior(name, linear.terms).resolution
+        left = linear.e[name][at] + linear.J[name][at] @ self.step
+        filtered = Filter.of(linear.levels.noise[name], resolution, time)
+        white = filtered.whiten(np.column_stack([columns, linear.J[name][at] * self.sd, left]))
+        steps, J, e = np.split(white, [columns.shape[1], columns.shape[1] + self.sd.size], axis=1)
+        across = solve_triangular(self.factor[0], J.T @ steps, lower=True)
+        size = tau**2 * (np.sum(steps**2, axis=0) - np.sum(across**2, axis=0))
+        return 0.5 * (tau * steps.T @ e)[:, 0] ** 2 / (1.0 + size) - 0.5 * np.log1p(size)
 
 
 def best_span(problem: Problem, linear: Linear, term: Term) -> Term:
