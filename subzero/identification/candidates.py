@@ -101,7 +101,7 @@ def _of_channel(
     yield from repeats(problem, name, linear.terms, simulated, data_odds(problem))
     soft = [term for term in own if term.kind == "offset"]
     for rest in others if soft else ():
-        yield from _steps(rest, name, soft[0])
+        yield from _step(rest, name, soft[0])
     before = float(np.mean(e[used] ** 2))
     if before < (OFF_LEVELS * level) ** 2:
         return
@@ -224,8 +224,8 @@ def _from_some_time(
             yield from_time(term, record, float(each.time[at[best]]), 1.0 / at.size)
 
 
-def _steps(others: _Others, name: str, term: Term) -> Iterator[Term]:
-    """Yield an offset of a channel from the time on that suits each record best in the linear problem, in which all
+def _step(others: _Others, name: str, term: Term) -> Iterator[Term]:
+    """Yield the offset of a channel from some time of a record on that gains most in the linear problem, in which all
     other numbers are free, if it is worth its prior there: what they bend to suit the readings would hide it.
     """
     problem, terms = others.problem, others.linear.terms
@@ -235,20 +235,32 @@ def _steps(others: _Others, name: str, term: Term) -> Iterator[Term]:
         for entry in problem.entries((replace(term, begins=0.0),))
         if (entry.kind, entry.name) == ("step", name)
     ]
+    most = 0.0
+    found: Term | None = None
     for record in np.unique(each.record).tolist():
         at = np.flatnonzero(used & (each.record == record))
-        first, last = FEWEST_AFTER, at.size - FEWEST_AFTER
-        while first <= last:  # some begins, then those between the best one's neighbours
-            begins = np.unique(np.linspace(first, last, BEGINS_TRIED).astype(int))
-            columns = (np.arange(at.size)[:, None] >= begins).astype(float)
-            gains = others.gains(name, at, columns, sd)
-            best = int(np.argmax(gains))
-            first, last = begins[max(best - 1, 0)], begins[min(best + 1, begins.size - 1)]
-            if begins.size == begins[-1] - begins[0] + 1:
-                late = from_time(term, record, float(each.time[at[begins[best]]]), 1.0 / at.size)
-                if gains[best] > -np.log(late.odds):
-                    yield late
-                break
+        if at.size < 2 * FEWEST_AFTER:
+            continue
+        begins, gain = _best_begin(others, name, at, sd)
+        late = from_time(term, record, float(each.time[at[begins]]), 1.0 / at.size)
+        if gain + np.log(late.odds) > most:
+            most, found = gain + float(np.log(late.odds)), late
+    if found:
+        yield found
+
+
+def _best_begin(others: _Others, name: str, at: np.ndarray, sd: float) -> tuple[int, float]:
+    """Return the reading of some, at which an offset begins that gains most, and its gain: of a hundred of them, and
+    then of those between the best one's neighbours. [nats]
+    """
+    first, last = FEWEST_AFTER, at.size - FEWEST_AFTER
+    while True:
+        begins = np.unique(np.linspace(first, last, BEGINS_TRIED).astype(int))
+        gains = others.gains(name, at, (np.arange(at.size)[:, None] >= begins).astype(float), sd)
+        best = int(np.argmax(gains))
+        if begins.size == last - first + 1:
+            return int(begins[best]), float(gains[best])
+        first, last = int(begins[max(best - 1, 0)]), int(begins[min(best + 1, begins.size - 1)])
 
 
 class _Others:

@@ -32,6 +32,8 @@ IN_EVERY = 0.9
 """A cause is known if explanations with this total probability share it; a cause is named from the same one on. [-]
 """
 
+WORTH_NAMING = 0.02
+"""Least probability of what may be in the place of a reported force or drift."""
 SURE = {
     0.999: "As sure as records can make one",
     0.95: "Very sure",
@@ -112,7 +114,9 @@ def _wrong(verdict: Verdict) -> Iterator[str]:
     if verdict.on_model == CAUSE_NAMED:
         yield from (words.cause_in_short(cause) for cause in verdict.causes)
     elif verdict.on_model == OUT_OF_CATALOGUE and verdict.unknown is not None:
-        yield words.unknown(verdict.unknown)
+        said = words.unknown(verdict.unknown)
+        own, _ = _unknown_shares(verdict)
+        yield said if own >= IN_EVERY else f"Most probably: {said[:1].lower()}{said[1:]}"
     else:
         if verdict.on_model == UNDECIDED:
             yield from _in_every_explanation(verdict)
@@ -143,11 +147,8 @@ def _sure(verdict: Verdict) -> Iterator[str]:
         yield f"That {error.sentence}: {_in_words(error.probability).lower()}."
     if verdict.on_model == UNDECIDED:
         yield "Not sure enough to name one of them."
-    elif verdict.on_model == OUT_OF_CATALOGUE and probability is not None:
-        anything = _anything_unknown(verdict)
-        yield f"That something acts which is no cause of the catalogue: {_in_words(anything).lower()} " + (
-            f"(probability {words.probability(anything)}); that it acts there: {words.probability(probability)}."
-        )
+    elif verdict.on_model == OUT_OF_CATALOGUE:
+        yield from _sure_of_unknown(verdict)
     elif probability is not None:
         sure = f"{_in_words(probability)} (probability {words.probability(probability)})."
         nothing = f"That nothing {'else ' if verdict.then else ''}is wrong: {sure[:1].lower()}{sure[1:]}"
@@ -177,15 +178,40 @@ def _probability(verdict: Verdict) -> float | None:
     return None
 
 
-def _anything_unknown(verdict: Verdict) -> float:
-    """Return the probability that any force or drift acts that no cause explains: of all explanations that have one,
-    and of one thing more than the reported explanation.
-    """
-    return sum(
-        p
-        for name, p in verdict.probabilities.items()
-        if name == UNSEEN or words.FORCE in name or words.DRIFT in name
+def _sure_of_unknown(verdict: Verdict) -> Iterator[str]:
+    """Yield how sure it is that anything acts which no cause explains, and that it is the one that is reported."""
+    anything = sum(p for name, p in verdict.probabilities.items() if name == UNSEEN or _unknown_in(name))
+    yield (
+        f"That something acts which is no cause of the catalogue: {_in_words(anything).lower()} "
+        f"(probability {words.probability(anything)})."
     )
+    own, others = _unknown_shares(verdict)
+    if own < IN_EVERY and others:
+        listed = "; ".join(f"{words.explanation(id)} ({p:.2f})" for id, p in others.items())
+        yield f"That it is this: {words.probability(own)}. In its place may be: {listed}."
+
+
+def _unknown_shares(verdict: Verdict) -> tuple[float, dict[str, float]]:
+    """Return the probability of the reported force or drift, over all explanations; and those of others that may be in
+    its place, the most probable first.
+    """
+    unknown, found = verdict.unknown, dict[str, float]()
+    assert unknown is not None
+    reported = f"{words.DRIFT if unknown.is_drift else words.FORCE}{unknown.axis}"
+    own = verdict.probabilities.get(UNSEEN, 0.0)  # the reported explanation with one thing more
+    for name, p in verdict.probabilities.items():
+        ids = _unknown_in(name)
+        if reported in ids:
+            own += p
+        else:
+            found |= {id: found.get(id, 0.0) + p for id in ids}
+    others = sorted(found.items(), key=lambda pair: -pair[1])
+    return own, {id: p for id, p in others if p >= WORTH_NAMING}
+
+
+def _unknown_in(name: str) -> list[str]:
+    """Return the forces and drifts of an explanation."""
+    return [id for id in name.split(" + ") if id.startswith((words.FORCE, words.DRIFT))]
 
 
 def _in_words(probability: float) -> str:
