@@ -29,9 +29,8 @@ SLOWEST_WHITE = 2.0
 """A part whose τ_s is less, in sampling intervals, is white. [-]"""
 USUAL_TIME = 10.0
 """Usual τ_s. [sampling intervals]"""
-TIME_SPREAD, TIME_FREEDOM, TIME_WEIGHT = 0.9, 2.0, 0.1
-"""Usual standard deviation of log τ_s of the channels of a logger about their mean; its degrees of freedom; weight of
-the usual time in this mean, in channels. [-]"""
+MEAN_SPREAD, TIME_SPREADS = 1.0, (0.15, 0.3, 0.6)
+"""Standard deviation of the mean of log τ_s of the channels of a logger; equally probable ones about this mean. [-]"""
 FLOOR_SHARE = 1e-6
 """Least level of a sensor whose noise was neither declared nor is seen, over the spread of its readings. [-]"""
 
@@ -99,9 +98,9 @@ class NoisePrior:
 def log_times(noise: Sequence[Noise], intervals: Sequence[float]) -> float:
     """Return the log prior density of τ_s of the channels of one logger, up to a constant.
 
-        log τ_k ~ N(μ, s²),   μ ~ N(log 10 Δ_k, s²/TIME_WEIGHT),   s² ~ scaled inverse χ²(TIME_FREEDOM, TIME_SPREAD²)
+        log τ_k ~ N(log 10 Δ_k + μ, s²),   μ ~ N(0, MEAN_SPREAD²),   s any of TIME_SPREADS
 
-    with μ and s² integrated out: channels of one logger often have one filter. A channel counts as much as its slow
+    with μ and s integrated out: channels of one logger often have one filter. A channel counts as much as its slow
     part has of its variance, as the time of a part that is not there says nothing.
 
     Args:
@@ -110,9 +109,11 @@ def log_times(noise: Sequence[Noise], intervals: Sequence[float]) -> float:
     """
     off = np.log([each.time / (USUAL_TIME * step) for each, step in zip(noise, intervals, strict=True)])
     weight = np.array([each.slow**2 / (each.slow**2 + each.white**2) for each in noise])
-    count = float(weight.sum())
-    square = float(weight @ off**2) - float(weight @ off) ** 2 / (count + TIME_WEIGHT)
-    return -0.5 * (TIME_FREEDOM + count) * float(np.log1p(square / (TIME_FREEDOM * TIME_SPREAD**2)))
+    precision = 1.0 / np.square(TIME_SPREADS)
+    shared = precision * weight.sum() + 1.0 / MEAN_SPREAD**2
+    square = precision * float(weight @ off**2) - (precision * float(weight @ off)) ** 2 / shared
+    log = 0.5 * weight.sum() * np.log(precision) - 0.5 * np.log(shared) - 0.5 * square
+    return float(np.logaddexp.reduce(log))
 
 
 def resolution_of(values: np.ndarray) -> float:

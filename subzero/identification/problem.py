@@ -160,12 +160,13 @@ class Problem:
         steps = np.diff(time)
         spread = OPEN_SPREAD if sensor.noise is None else sensor.spread
         prior = NoisePrior(level, step, float(np.median(steps[steps > 0.0])), spread)
-        # In a wrong unit readings are rougher than the sensor says. What is read off them has their rounding in it.
-        far = SPIKE * max(float(np.hypot(level, step / np.sqrt(12.0))), level_of(values, step))
         away = self._wrapped(name, values - self._at_nominal(name, having))
+        # In a wrong unit readings are rougher than the sensor says. What is read off them has their rounding in it.
+        least = float(np.hypot(level, step / np.sqrt(12.0)))
+        far, far_away = (SPIKE * max(least, level_of(rows, step)) for rows in (values, away))
         alone = np.concatenate(
             [
-                spikes(values[at], far, sensor.turn) | spikes_at_ends(away[at], far)
+                spikes(values[at], far, sensor.turn) | spikes_at_ends(away[at], min(far, far_away))
                 for k, _ in having
                 for at in [of == k]
             ]
@@ -251,10 +252,13 @@ class Problem:
             # Where an explanation leaves more than the sensor errs, that is its own error.
             usual = max(levels[name], MEDIAN_TO_SD * float(np.median(np.abs(e[name][used]))))
             left, far = np.where(used, e[name], np.nan), SPIKE * usual
+            # At an end, where one side alone is seen, a reading that is late at a jump is none.
+            steps = np.abs(np.diff(self.recorded(name, terms) - e[name], prepend=np.nan, append=np.nan))
+            still = np.abs(left) > np.fmax(steps[:-1], steps[1:])
             alone = np.concatenate(
                 [
-                    spikes(left[at], far, 0.0) | spikes_at_ends(left[at], far)
-                    for k in np.unique(each.record)
+                    spikes(left[at], far, 0.0) | (spikes_at_ends(left[at], 2.0 * far) & still[at])
+                    for k in np.unique(each.record).tolist()
                     for at in [each.record == k]
                 ]
             )

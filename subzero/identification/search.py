@@ -449,7 +449,10 @@ class Search:
         here, before = nominal, self._linear_score(nominal)
         while len(here.terms) < MOST_TERMS:
             added = [
-                each for each in self._additions(here, self._gross) if _is_gross_kind(_new(here, each[1]))
+                (score, there)
+                for score, there in self._additions(here, self._gross)
+                for new in [_new(here, there)]
+                if _is_gross_kind(new) and new.kind != "offset"  # a step is judged with the noise of a fit
             ]
             if not added or added[0][0] < before + GROSS:
                 break
