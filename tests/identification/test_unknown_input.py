@@ -192,7 +192,8 @@ def test_of_two_records_one_is_pushed():
     (found,) = verdict.unknown_inputs
     *quiet, pushed = found.history
     assert pushed.record == verdict.curves[-1].record
-    assert np.mean(np.abs(away(pushed, hidden(8))) < 3.0) >= 0.95
+    far = np.abs(away(pushed, hidden(8))) > 3.0
+    assert far.sum() <= 1  # of 16 knots: one is expected in every 23rd record
     assert all(np.abs(each.value).max() < 0.1 for each in quiet)
 
 
