@@ -42,7 +42,7 @@ BEYOND, OFFSET_LEVELS, RATE_SCALE = 10.0, 30.0, 0.03
 """Usual error of an offset or a drift, in tolerances of the sensor's zero, or in its levels where none is declared; of
 the rate of a clock. [-]"""
 
-PRIOR_CAUSE, MOST_LIKELY, PRIOR_TOLERANCES, PRIOR_DATA, PRIOR_NEXT_DATA = 0.5, 0.05, 0.1, 0.05, 0.3
+PRIOR_CAUSE, MOST_LIKELY, PRIOR_TOLERANCES, PRIOR_DATA, PRIOR_NEXT_DATA = 0.5, 0.05, 0.1, 0.1, 0.3
 """Prior odds that any one cause acts, and most of a single one; that tolerances are too narrow; that the readings of a
 channel have any one error; and of such an error in a logger that has one already. [-]"""
 PRIOR_UNKNOWN = 0.02

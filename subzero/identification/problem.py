@@ -30,6 +30,7 @@ from subzero.identification.noise import (
     middle_of_equal,
     resolution_of,
 )
+from subzero.identification.outliers import are_turns, by_record, jumps, outliers_of, spikes, spikes_at_ends
 from subzero.identification.record import Record
 from subzero.identification.simulation import Asked, Runs
 
@@ -48,9 +49,6 @@ FREE_TURNS = 2.0
 """So many turns readings of an angle may span besides twice the turns of the nominal model: its logger wraps it. [-]"""
 FOLLOWS = 0.25
 """Residuals of an angle that change by less between neighbours, in turns, are followed beyond half a turn. [-]"""
-SAME_JUMP, ALONE = 0.25, 4.0
-"""Steps of an angle within this share of a turn are turns of its logger; one stands alone if its neighbours are so
-many times smaller. [-]"""
 MAX_KNOTS = 200
 """Most knots of one unknown input in one record: its time is lengthened where there would be more."""
 FIXED = 1e-6
@@ -164,13 +162,8 @@ class Problem:
         # In a wrong unit readings are rougher than the sensor says. What is read off them has their rounding in it.
         least = float(np.hypot(level, step / np.sqrt(12.0)))
         far, far_away = (SPIKE * max(least, level_of(rows, step)) for rows in (values, away))
-        alone = np.concatenate(
-            [
-                spikes(values[at], far, sensor.turn) | spikes_at_ends(away[at], min(far, far_away))
-                for k, _ in having
-                for at in [of == k]
-            ]
-        )
+        alone = by_record(of, lambda at: spikes(values[at], far, sensor.turn))
+        alone |= by_record(of, lambda at: spikes_at_ends(away[at], min(far, far_away)))
         aside = np.isfinite(values) & (~inside | alone)
         used = finite & ~aside
         for k, _ in having:
@@ -252,16 +245,7 @@ class Problem:
             # Where an explanation leaves more than the sensor errs, that is its own error.
             usual = max(levels[name], MEDIAN_TO_SD * float(np.median(np.abs(e[name][used]))))
             left, far = np.where(used, e[name], np.nan), SPIKE * usual
-            # At an end, where one side alone is seen, a reading that is late at a jump is none.
-            steps = np.abs(np.diff(self.recorded(name, terms) - e[name], prepend=np.nan, append=np.nan))
-            still = np.abs(left) > np.fmax(steps[:-1], steps[1:])
-            alone = np.concatenate(
-                [
-                    spikes(left[at], far, 0.0) | (spikes_at_ends(left[at], 2.0 * far) & still[at])
-                    for k in np.unique(each.record).tolist()
-                    for at in [each.record == k]
-                ]
-            )
+            alone = outliers_of(left, self.recorded(name, terms) - e[name], each.record, far)
             if 0 < alone.sum() <= RARE * each.used.sum():
                 found[_column(name, terms)] = alone
         return found
@@ -330,7 +314,9 @@ class Problem:
         return [self._as_fixed(entry) for entry in (*own, *starts, *unknown)]
 
     def _acting(self, k: int, unknown: Unknown, terms: Terms) -> list[tuple[int, int]]:
-        """Return the knots of an unknown input in record k at which an explanation lets it act, and the intervals."""
+        """Return the knots of record k at which an unknown input acts in an explanation, each with the number of
+        intervals between the first and the last knot of the record.
+        """
         own = [term for term in terms if term.kind == "unknown" and term.target == unknown.name]
         spans = [(term.intervals, term.begins, term.ends) for term in own if term.record in (-1, k)]
         found: list[tuple[int, int]] = []
@@ -635,59 +621,3 @@ def _input(record: Record, name: str) -> np.ndarray:
     if not known.any():
         raise UserError(f"{record.name}: the input {name!r} has no value.")
     return np.interp(record.time, at[known], values[known])
-
-
-def jumps(values: np.ndarray) -> np.ndarray:
-    """Return the sizes of steps between readings (m,) that stand alone among the largest."""
-    steps = np.abs(np.diff(values))
-    neighbours = np.maximum(np.append(steps[1:], 0.0), np.append(0.0, steps[:-1]))
-    return steps[(steps > 0.5 * steps.max(initial=0.0)) & (steps > ALONE * neighbours)]
-
-
-def are_turns(alone: np.ndarray, turn: float) -> bool:
-    """Return whether steps that stand alone (n,) are those of an angle that is wrapped at a turn."""
-    return bool(alone.size and (np.abs(alone / turn - 1.0) < SAME_JUMP).all())
-
-
-def spikes(values: np.ndarray, far: float, turn: float) -> np.ndarray:
-    """Return which readings (m,) are alone far from a line, and from a cubic, through those next to them, where these
-    agree: a curve that is sampled coarsely has no spikes, nor has the neighbour of one. Of two in a row
-    each is twice as far from six neighbours, most of which agree.
-    """
-    found, at = np.zeros(values.size, dtype=bool), np.flatnonzero(np.isfinite(values))
-    if at.size < 5:
-        return found
-    at, each = at[2:-2], at[np.arange(at.size - 4)[:, None] + [0, 1, 3, 4]]
-    away = values[each] - values[at][:, None]
-    if turn:
-        away -= turn * np.rint(away / turn)
-    line, cubic = away @ [0.0, 0.5, 0.5, 0.0], away @ [-1.0 / 6.0, 4.0 / 6.0, 4.0 / 6.0, -1.0 / 6.0]
-    off = np.minimum(np.abs(line), np.abs(cubic))
-    apart = np.maximum(2.0 * np.abs(line - cubic), np.abs(away[:, 1] - away[:, 2]))
-    found[at] = (off > far) & (apart < off)
-    return found | _pairs(values, 2.0 * far, turn)
-
-
-def _pairs(values: np.ndarray, far: float, turn: float) -> np.ndarray:
-    """Return which readings (m,) are far from the median of the six next to them, the middle four of which agree."""
-    found, at = np.zeros(values.size, dtype=bool), np.flatnonzero(np.isfinite(values))
-    if at.size < 7:
-        return found
-    each, at = at[np.arange(at.size - 6)[:, None] + [0, 1, 2, 4, 5, 6]], at[3:-3]
-    away = values[each] - values[at][:, None]
-    if turn:
-        away -= turn * np.rint(away / turn)
-    ordered = np.sort(away, axis=1)
-    off = np.abs(np.median(ordered, axis=1))
-    found[at] = (off > far) & (ordered[:, 4] - ordered[:, 1] < 0.25 * off)
-    return found
-
-
-def spikes_at_ends(away: np.ndarray, far: float) -> np.ndarray:
-    """Return which of the first and last two of residuals (m,) are far from the four next to them, which agree."""
-    found, at = np.zeros(away.size, dtype=bool), np.flatnonzero(np.isfinite(away))
-    for ends in (at, at[::-1]) if at.size > 5 else ():
-        neighbours = away[ends[2:6]]
-        off = np.abs(away[ends[:2]] - np.median(neighbours))
-        found[ends[:2]] |= (off > far) & (np.ptp(neighbours) < 0.5 * off)
-    return found

@@ -21,7 +21,8 @@ from subzero.identification.noise import (
     middle_of_equal,
     resolution_of,
 )
-from subzero.identification.problem import Problem, spikes, spikes_at_ends
+from subzero.identification.outliers import spikes, spikes_at_ends
+from subzero.identification.problem import Problem
 from tests.identification.oscillator import STEP, model, record
 
 

@@ -151,9 +151,7 @@ def _used(values: np.ndarray, difference: np.ndarray, usual: NoisePrior) -> np.n
     return used
 
 
-def with_residual_noise(
-    problem: Problem, z: np.ndarray, D: np.ndarray, white: np.ndarray | None = None
-) -> Problem | None:
+def with_residual_noise(problem: Problem, z: np.ndarray, D: np.ndarray) -> Problem | None:
     """Return the problem with the noise estimated from the residual at deviations z; None if it hardly differs from
     the present one.
 
@@ -161,13 +159,10 @@ def with_residual_noise(
         problem: records and parameters.
         z: the best fit so far (k,).
         D: prior variances of the parameters in it (k,).
-        white: whitened sensitivities of the problem close to z (m, k); if given, the outliers are left as they are.
     """
-    records = tuple(
-        _without_outliers(problem, i, z) if white is None else each for i, each in enumerate(problem.records)
-    )
+    records = tuple(_without_outliers(problem, i, z) for i in range(len(problem.records)))
     plain = replace(problem, records=tuple(replace(each, noise=_unit(each)) for each in records))
-    r, J = plain.residual(z), plain.jacobian(z) if white is None else whitened_again(problem, plain, white)
+    r, J = plain.residual(z), plain.jacobian(z)
     rest, F, at, found = r + J @ z, J * np.sqrt(D), 0, []
     for record in records:
         columns = {}

@@ -15,7 +15,7 @@ import numpy as np
 
 from subzero.channels import BY_NAME
 from subzero.diagnosis.report import words
-from subzero.diagnosis.report.tables import CLEAR_FROM, CONFUSED_BELOW, SEEN_SIGNAL
+from subzero.diagnosis.report.tables import CLEAR_FROM, CONFUSED_BELOW, SEEN_SIGNAL, WORTH_A_LINE
 from subzero.diagnosis.results import (
     CALIBRATED,
     CAUSE_NAMED,
@@ -32,8 +32,6 @@ IN_EVERY = 0.9
 """A cause is known if explanations with this total probability share it; a cause is named from the same one on. [-]
 """
 
-WORTH_NAMING = 0.02
-"""Least probability of what may be in the place of a reported force or drift."""
 SURE = {
     0.999: "As sure as records can make one",
     0.95: "Very sure",
@@ -206,7 +204,7 @@ def _unknown_shares(verdict: Verdict) -> tuple[float, dict[str, float]]:
         else:
             found |= {id: found.get(id, 0.0) + p for id in ids}
     others = sorted(found.items(), key=lambda pair: -pair[1])
-    return own, {id: p for id, p in others if p >= WORTH_NAMING}
+    return own, {id: p for id, p in others if p >= WORTH_A_LINE}
 
 
 def _unknown_in(name: str) -> list[str]:
