@@ -14,7 +14,16 @@ from numpy.testing import assert_allclose
 
 import subzero
 from benchmarks.diagnosis import world
-from subzero.diagnosis.inference import Noise, Observed, as_noise, prior_of, resolution_of, spikes
+from subzero.diagnosis import NOISE, catalogue
+from subzero.diagnosis.inference import (
+    Noise,
+    Observed,
+    as_noise,
+    prior_of,
+    resolution_of,
+    spikes,
+    with_residual_noise,
+)
 from subzero.identification import noise as general
 from subzero.identification.noise import log_times, most_probable, visible
 
@@ -142,6 +151,21 @@ def test_a_healthy_record_with_white_and_slow_noise_at_once_gets_no_name(index):
     logged, planted = world.record_of(world.drawn(7301, index + 1)[index])
     assert not planted
     assert subzero.diagnose(logged, budget="verdict").verdict != "cause_named"
+
+
+def test_a_misfit_that_the_parameters_can_follow_is_no_noise(plant):
+    """A hull with half as much drag again, which the prior allows or forbids."""
+    planted = plant(lambda setting: catalogue(["depth"])["hull_drag"].apply(setting, 0.5))
+    problem, zero = planted.problem, np.zeros(len(planted.problem.entries))
+    drag = [entry.effect.id == "hull_drag" for entry in problem.entries]
+    level = {}
+    for allowed in (0.5, 1e-6):
+        D = np.where(drag, allowed, 1e-6 * np.array([e.parameter.tolerance for e in problem.entries])) ** 2
+        again = with_residual_noise(problem, zero, D)
+        (record,) = (again or problem).records
+        level[allowed] = record.noise["surge_speed"].sd / NOISE["surge_speed"]
+    assert level[0.5] == pytest.approx(1.0, rel=0.2)  # 300 samples of coloured noise
+    assert level[1e-6] > 2.0
 
 
 def test_a_wander_of_twenty_levels_is_no_noise():

@@ -255,7 +255,8 @@ def test_the_history_is_in_text_json_and_picture():
     plt.close(figure)
 
 
-def test_the_best_span_of_a_push_is_that_of_the_highest_density():
+@pytest.mark.parametrize("acts", [(3,), (2, 3, 4)])
+def test_the_best_span_of_a_push_is_that_of_the_highest_density(acts):
     """By brute force: the density of the record for every span of knots, with the covariance that this one gives it."""
     from scipy.stats import multivariate_normal
 
@@ -265,7 +266,10 @@ def test_the_best_span_of_a_push_is_that_of_the_highest_density():
     from subzero.identification.problem import Problem
 
     time = STEP * np.arange(61)
-    y = 2.0 * np.clip(1.0 - np.abs(time - 3.0), 0.0, 1.0) + 0.1 * np.random.default_rng(3).standard_normal(61)
+    knots, rng = np.arange(7.0), np.random.default_rng(3)
+    heights = [{2: 2.0, 3: -1.5, 4: 2.0}[k] if len(acts) > 1 else 2.0 for k in acts]
+    y = sum(h * np.interp(time, knots, np.eye(7)[k]) for k, h in zip(acts, heights, strict=True))
+    y += 0.1 * rng.standard_normal(61)
     push = sd.Unknown("push", size=1.0, time=1.0, usual=False)
     model = sd.Model(
         lambda p, u, t: {"y": p["rate"] * t + u["push"]},
@@ -294,11 +298,11 @@ def test_the_best_span_of_a_push_is_that_of_the_highest_density():
         ]
         share += [1.0 / (3 * len(some))] * len(some)
     best = int(np.argmax(np.array(log) + np.log(share)))
-    assert (found.begins, found.ends, found.intervals) == spans[best] == (3.0, 3.0, 6)
+    assert (found.begins, found.ends, found.intervals) == spans[best] == (acts[0], acts[-1], 6)
     odds = term.odds * np.sum(np.array(share) * np.exp(np.array(log) - log[best]))
     # Coarse knots are not all among the fine ones, from which their columns are made.
     assert found.odds == pytest.approx(odds, rel=0.02)
-    assert found.sentence.startswith("from 2 to 4 s, ")  # where it is not 0
+    assert found.sentence.startswith(f"from {acts[0] - 1} to {acts[-1] + 1} s, ")  # where it is not 0
 
 
 @pytest.mark.long
