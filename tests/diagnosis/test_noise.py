@@ -154,18 +154,19 @@ def test_a_healthy_record_with_white_and_slow_noise_at_once_gets_no_name(index):
 
 
 def test_a_misfit_that_the_parameters_can_follow_is_no_noise(plant):
-    """A hull with half as much drag again, which the prior allows or forbids."""
-    planted = plant(lambda setting: catalogue(["depth"])["hull_drag"].apply(setting, 0.5))
+    """A hull that is a little heavier, which the prior just allows, or forbids."""
+    heavier, name = 0.02, "net_buoyancy"  # [N]
+    planted = plant(lambda setting: catalogue(["depth"])[name].apply(setting, -heavier))
     problem, zero = planted.problem, np.zeros(len(planted.problem.entries))
-    drag = [entry.effect.id == "hull_drag" for entry in problem.entries]
+    free = [entry.effect.id == name for entry in problem.entries]
     level = {}
-    for allowed in (0.5, 1e-6):
-        D = np.where(drag, allowed, 1e-6 * np.array([e.parameter.tolerance for e in problem.entries])) ** 2
+    for allowed in (heavier, 1e-6):
+        D = np.where(free, allowed, 1e-6 * np.array([e.parameter.tolerance for e in problem.entries])) ** 2
         again = with_residual_noise(problem, zero, D)
         (record,) = (again or problem).records
-        level[allowed] = record.noise["surge_speed"].sd / NOISE["surge_speed"]
-    assert level[0.5] == pytest.approx(1.0, rel=0.2)  # 300 samples of coloured noise
-    assert level[1e-6] > 2.0
+        level[allowed] = record.noise["depth"].sd / NOISE["depth"]
+    assert level[heavier] == pytest.approx(1.0, rel=0.2)  # 300 samples of coloured noise
+    assert level[1e-6] > 1.5
 
 
 def test_a_wander_of_twenty_levels_is_no_noise():
