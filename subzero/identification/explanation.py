@@ -49,7 +49,8 @@ PRIOR_UNKNOWN = 0.02
 """Prior odds that any one input acts that is 0 in a healthy model. [-]"""
 
 ONSET_ODDS = 0.2
-"""Odds that a cause begins in the middle of a record, over those that it holds throughout. [-]"""
+"""Odds that a cause, or an error in the data, begins in the middle of a record, over those that it holds throughout.
+[-]"""
 ONSET_SHARES = tuple(np.arange(0.1, 0.95, 0.1).tolist())
 """Where a search for an onset begins, over the duration of a record. [-]"""
 
@@ -359,14 +360,14 @@ def input_terms(model: Model) -> list[Term]:
 
 
 def from_time(term: Term, record: int, time: float, share: float) -> Term:
-    """Return a data error that begins at a time of a record, with a share of its odds. [s]"""
+    """Return a data error that begins at a time of a record [s], one of several: each has a share of the odds."""
     return replace(
         term,
         id=f"{term.id}@{record}",
         sentence=f"from {time:.4g} s on, {term.sentence}",
         begins=time,
         record=record,
-        odds=share * term.odds,
+        odds=ONSET_ODDS * share * term.odds,
     )
 
 
@@ -394,7 +395,7 @@ def entries_of(terms: Terms, model: Model, levels: dict[str, float], delays: dic
     causes = {cause.id: cause for cause in model.causes}
     for term in terms:
         if term.kind == "cause":
-            found += _of_cause(causes[term.target], term)
+            found += _of_cause(causes[term.target], term, model)
     for name in levels:
         found += _of_sensor(name, model, terms, levels[name], delays[name])
     return found
@@ -416,7 +417,8 @@ def _spread(name: str, tolerance: float, terms: Sequence[Term], model: Model) ->
     return math.sqrt(variance)
 
 
-def _of_cause(cause: Cause, term: Term) -> list[Entry]:
+def _of_cause(cause: Cause, term: Term, model: Model) -> list[Entry]:
+    numbers = {number.name: number for number in model.shared}
     found = [
         Entry(
             "cause",
@@ -431,8 +433,17 @@ def _of_cause(cause: Cause, term: Term) -> list[Entry]:
     ]
     if math.isfinite(term.begins):
         found += [
-            Entry("change", f"{cause.id}.{name}", 0.0, size, term.record)
+            Entry(
+                "change",
+                f"{cause.id}.{name}",
+                0.0,
+                size,
+                term.record,
+                own.low - own.nominal,
+                own.high - own.nominal,
+            )
             for name, size in cause.changes.items()
+            for own in [numbers[name]]
         ]
         spread = term.ends / math.sqrt(2.0 * math.pi)
         found.append(Entry("since", cause.id, term.begins, spread, term.record, 0.0, term.ends))

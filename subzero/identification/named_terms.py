@@ -40,8 +40,8 @@ def said_of(ranked: Sequence[Fit], probabilities: np.ndarray) -> Iterator[Said]:
     input or drift the probability is that any of them holds, and the others are its alternatives, the most probable
     first, until one of them holds for sure.
     """
-    unseen = 1.0 - float(probabilities.sum())  # an unseen term may be added to the best explanation
-    every = list(zip((ranked[0], *ranked), (unseen, *probabilities.tolist()), strict=True))
+    # One thing more, unseen, may be added to any explanation.
+    every = list(zip(ranked, (probabilities / probabilities.sum()).tolist(), strict=True))
     own: dict[str, float] = {}
     terms: dict[str, Term] = {}
     for each, p in every:

@@ -357,6 +357,11 @@ class Problem:
                 unknown[entry.name] += value * self._hat(k, entry.intervals, entry.knot)
             else:
                 numbers[f"{entry.name}.since" if entry.kind == "since" else entry.name] = value
+        shared = {number.name: number for number in self.model.shared}
+        for name in (entry.name for entry in entries if entry.kind == "change"):
+            own = shared[name.partition(".")[2]]  # with its change it is within its bounds, too
+            now = numbers[own.name]
+            numbers[name] = min(max(numbers[name], own.low - now), own.high - now)
         return Asked(numbers, unknown)
 
     def _hat(self, k: int, intervals: int, knot: int) -> np.ndarray:

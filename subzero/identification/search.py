@@ -52,6 +52,8 @@ RANKED_AGAIN, FITTED = 10, 6
 """So many of the best are ranked again with their own noise; at most so many of these are fitted."""
 WITHIN = 5.0
 """Explanations within this of the best are expanded, too. [nats]"""
+ONSET_GAIN = 5.0
+"""A cause that begins in mid-record gains up to that when it is fitted: its time is not linear. [nats]"""
 WORTH, GROSS = 3.0, 100.0
 """A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one, and a fit that
 is so far below the best one is not brought to its end. [nats]"""
@@ -391,7 +393,9 @@ class Search:
         """Fit the first of explanations with one term more than a base, which are ranked."""
         here, added = self._linear_score(base), ranked[:FITTED]
         for score, linear in added:
-            if score > max(here - WORTH, min(self.score(self.ranked()[0]), added[0][0]) - WITHIN):
+            late = any(term.kind == "cause" and math.isfinite(term.begins) for term in linear.terms)
+            near = min(self._best(), added[0][0]) - WITHIN - (ONSET_GAIN if late else 0.0)
+            if score > max(here - WORTH, near):
                 self._fit(linear, score)
 
     def _twins(self, term: Term) -> Iterator[Term]:

@@ -59,3 +59,32 @@ def test_a_step_is_found_that_other_numbers_bend_to_suit(at):
     (size,) = found.estimates
     assert abs(size.value - 0.25) < 3.0 * size.sd
     assert f"from {at:.0f}" in found.sentence or f"from {at - 0.1:.1f}" in found.sentence
+
+
+@pytest.mark.parametrize("drag", [0.2, 0.3])
+def test_no_model_is_asked_for_a_number_beyond_its_bounds(drag):
+    """A drag that vanishes from some time on: a model that refuses less than none is not asked for it."""
+
+    def slowed(p, u, t):
+        drag = p["drag"] + p["less"]["drag"] * (t >= p["less"]["since"])
+        if min(drag) < 0.0:
+            raise ValueError(f"a drag of {min(drag)}")
+        v, shown = 0.0, []
+        for force, each in zip(u["force"], drag, strict=True):
+            shown.append(v)
+            v += 0.1 * (force - each * v)
+        return {"v": np.array(shown)}
+
+    model = sd.Model(
+        slowed,
+        {"v": sd.Sensor(noise=0.02, resolution=0.0)},
+        inputs=["force"],
+        parameters=[sd.Number("drag", 0.3, tolerance=0.05, low=0.0)],
+        causes=[sd.Cause("less", "the drag is another", changes={"drag": 0.3}, onset=True)],
+    )
+    time, rng = 0.1 * np.arange(300), np.random.default_rng(2)
+    force = {"force": np.sign(np.sin(2.0 * np.pi * time / 9.0))}
+    true = {"drag": drag, "less": {"drag": -drag, "since": 12.0}}
+    v = slowed(true, force, time)["v"] + 0.02 * rng.standard_normal(300)
+    (found,) = sd.diagnose(sd.Record(time, {"v": v, **force}), model).named
+    assert found.id == "less@"

@@ -178,7 +178,7 @@ def _probability(verdict: Verdict) -> float | None:
 
 def _sure_of_unknown(verdict: Verdict) -> Iterator[str]:
     """Yield how sure it is that anything acts which no cause explains, and that it is the one that is reported."""
-    anything = sum(p for name, p in verdict.probabilities.items() if name == UNSEEN or _unknown_in(name))
+    anything = sum(p for name, p in _seen(verdict).items() if _unknown_in(name))
     yield (
         f"That something acts which is no cause of the catalogue: {_in_words(anything).lower()} "
         f"(probability {words.probability(anything)})."
@@ -196,8 +196,8 @@ def _unknown_shares(verdict: Verdict) -> tuple[float, dict[str, float]]:
     unknown, found = verdict.unknown, dict[str, float]()
     assert unknown is not None
     reported = f"{words.DRIFT if unknown.is_drift else words.FORCE}{unknown.axis}"
-    own = verdict.probabilities.get(UNSEEN, 0.0)  # the reported explanation with one thing more
-    for name, p in verdict.probabilities.items():
+    own = 0.0
+    for name, p in _seen(verdict).items():
         ids = _unknown_in(name)
         if reported in ids:
             own += p
@@ -205,6 +205,12 @@ def _unknown_shares(verdict: Verdict) -> tuple[float, dict[str, float]]:
             found |= {id: found.get(id, 0.0) + p for id in ids}
     others = sorted(found.items(), key=lambda pair: -pair[1])
     return own, {id: p for id, p in others if p >= WORTH_A_LINE}
+
+
+def _seen(verdict: Verdict) -> dict[str, float]:
+    """Return the probabilities of explanations, whatever may be added to each that these records do not show."""
+    seen = {name: p for name, p in verdict.probabilities.items() if name != UNSEEN}
+    return {name: p / sum(seen.values()) for name, p in seen.items()}
 
 
 def _unknown_in(name: str) -> list[str]:
