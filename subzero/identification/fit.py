@@ -486,7 +486,7 @@ def linearised(
 
 
 def _stepped(problem: Problem, linear: Linear) -> Linear:
-    """Return the problem after Gauss-Newton steps with the sensitivities as they are, each shortened until it gains."""
+    """Return the problem after Gauss-Newton steps, each shortened until it gains; sensitivities learn from each."""
     at, low_high = linear, bounds(linear.entries)
     cost = _negative_log_posterior(problem, at)
     for _ in range(STEPS):
@@ -496,10 +496,25 @@ def _stepped(problem: Problem, linear: Linear) -> Linear:
         taken = next(((there, new) for there, new in costs if new < cost), None)
         if taken is None:
             return at
-        gained, (at, cost) = cost - taken[1], taken
+        gained, at, cost = cost - taken[1], with_secant(at, taken[0]), taken[1]
         if gained < ENOUGH:
             return at
     return at
+
+
+def with_secant(linear: Linear, there: Linear) -> Linear:
+    """Return a problem at another point, with sensitivities that explain the change of the residuals on the way there,
+    and are otherwise unchanged (Broyden 1965): J + (−Δe − J s) (D⁻¹ s)ᵀ/(sᵀ D⁻¹ s), s in prior deviations.
+    """
+    step = there.x - linear.x
+    weighted = step / spreads(linear.entries, linear.levels) ** 2
+    if not (size := float(step @ weighted)) > 0.0:
+        return there
+    J = {
+        name: J + np.outer(linear.e[name] - there.e[name] - J @ step, weighted / size)
+        for name, J in linear.J.items()
+    }
+    return replace(there, J=J)
 
 
 def _moved(problem: Problem, linear: Linear, sets: Sequence[np.ndarray]) -> Iterator[Linear]:

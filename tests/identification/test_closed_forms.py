@@ -4,13 +4,24 @@ Tolerance: rounding errors, 1e-8; Laplace is exact for a linear problem, whose c
 1e-6.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
 import subzero.diagnosis as sd
 from subzero.identification.explanation import data_terms
-from subzero.identification.fit import Levels, Products, fit, given_others, linearised, solve, usual_levels
+from subzero.identification.fit import (
+    Levels,
+    Products,
+    fit,
+    given_others,
+    linearised,
+    solve,
+    usual_levels,
+    with_secant,
+)
 from subzero.identification.noise import (
     Filter,
     Noise,
@@ -137,6 +148,22 @@ def test_a_linearisation_shows_the_derivatives_of_the_model(problem):
     J = problem.jacobian((), entries, np.array([entry.centre for entry in entries]))["y"]
     np.testing.assert_allclose(J[:, 0], 1.0, atol=1e-8)
     np.testing.assert_allclose(J[:, 1], problem.records[0].time, atol=1e-8)
+
+
+def test_sensitivities_learn_the_slope_along_a_step_and_nothing_across_it(problem):
+    """The secant condition; what the prior calls orthogonal to the step keeps its slope."""
+    entries, rng = problem.entries(()), np.random.default_rng(0)
+    x, levels = np.array([entry.centre for entry in entries]), usual_levels(problem, ())
+    here = linearised(problem, (), entries, x, levels)
+    wrong = replace(here, J={"y": here.J["y"] + rng.normal(size=here.J["y"].shape)})
+    step = rng.normal(size=x.size)
+    there = replace(wrong, x=x + step, e=linearised(problem, (), entries, x + step, levels).e)
+    J = with_secant(wrong, there).J["y"]
+    np.testing.assert_allclose(J @ step, here.e["y"] - there.e["y"], atol=1e-8)
+    across = rng.normal(size=x.size)
+    D = np.array([entry.sd for entry in entries]) ** 2
+    across -= step * (across @ (step / D)) / (step @ (step / D))
+    np.testing.assert_allclose(J @ across, wrong.J["y"] @ across, atol=1e-8)
 
 
 @pytest.mark.parametrize("step", [0.1, 0.25, 1.0])
