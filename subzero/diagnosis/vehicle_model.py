@@ -90,6 +90,7 @@ def vehicle_model(
         ],
         causes=[*map(_cause, known.throughout.values()), *map(_onset, known.onsets.values())],
         unknown=[*(_force(axis, usual=axis in axes) for axis in AXES), *map(_drift, channels)],
+        trusted_inputs=[TRIAL],
         parallel=True,
     )
     return model, [

@@ -58,7 +58,15 @@ def declared(problem: Problem) -> list[Term]:
     durations = [float(np.ptp(record.time)) for record in problem.records]
     data = [term for term in data_terms(model) if term.target in (*problem.channels, CLOCK)]
     data = [term for term in data if term.kind != "unit" or problem.may_read(term.target, term.factor)]
-    inputs = [term for term in input_terms(problem.model) if term.target in problem.moving_inputs]
+    inputs = [
+        term
+        for term in input_terms(problem.model)
+        if (
+            problem.differ(term.target, term.partner)
+            if term.partner
+            else term.target in problem.moving_inputs
+        )
+    ]
     data = [
         term
         for term in data

@@ -339,11 +339,12 @@ def data_terms(model: Model) -> list[Term]:
 
 def input_terms(model: Model) -> list[Term]:
     """Return terms of the errors that the inputs of a record may have."""
-    odds, pairs = PRIOR_DATA / max(len(model.inputs), 1), list(combinations(model.inputs, 2))
+    inputs = [name for name in model.inputs if name not in model.trusted_inputs]
+    odds, pairs = PRIOR_DATA / max(len(inputs), 1), list(combinations(inputs, 2))
     known = [(f, words) for f, _, words, _ in KNOWN if f < 0.0 or max(f, 1.0 / f) > OF_ACTUATORS]
     units = [
         Term(f"input:{name}", f"the input {name}: {words}", "input", name, odds / len(known), factor=factor)
-        for name in model.inputs
+        for name in inputs
         for factor, words in known
     ]
     return units + [

@@ -248,6 +248,7 @@ class Model:
         causes: what may be wrong.
         unknown: inputs that are not known: part of every explanation, or offered as a term of one.
         tuned_on: parameter → channels through which it was tuned: an error of such a channel moves the parameter.
+        trusted_inputs: those in which no error is considered.
         batch: whether it computes many sets at once: numbers are (k,), inputs (n, 1) or (n, k), readings (n, k).
         parallel: whether it may be called by several threads at once.
     """
@@ -259,6 +260,7 @@ class Model:
     causes: Sequence[Cause] = ()
     unknown: Sequence[Unknown] = ()
     tuned_on: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    trusted_inputs: Sequence[str] = ()
     batch: bool = False
     parallel: bool = False
 
@@ -280,6 +282,7 @@ class Model:
         _known("tuned_on names the parameter", self.tuned_on, names)
         for channels in self.tuned_on.values():
             _known("tuned_on names the channel", channels, list(self.channels))
+        _known("trusted_inputs names the input", self.trusted_inputs, list(self.inputs))
         for unknown in self.unknown:
             if unknown.name.startswith(COMMAND):
                 _known(

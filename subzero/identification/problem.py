@@ -278,6 +278,10 @@ class Problem:
         """Inputs that change within a record."""
         return {name for each in self.inputs for name, values in each.items() if np.ptp(values) > 0.0}
 
+    def differ(self, a: str, b: str) -> bool:
+        """Return whether two inputs are not the same in all records, so that an exchange of their columns matters."""
+        return any(not np.array_equal(each[a], each[b]) for each in self.inputs)
+
     @cached_property
     def _longest(self) -> float:
         """Duration of the longest record. [s]"""

@@ -46,11 +46,11 @@ def model(*, noise=True):
     )
 
 
-def record(seed=0, *, late=(), fast=0.0, own=False, samples=300, **numbers):
+def record(seed=0, *, late=(), fast=0.0, own=False, samples=300, levels=(0.0, 2.0), **numbers):
     """Return a record of a rod; the clocks of some channels are fast by a share, with times of their own or not."""
     rng = np.random.default_rng(seed)
     power, second = (
-        np.repeat(rng.choice(levels, samples // 20), 20) for levels in ([-4.0, 0.0, 4.0, 8.0], [0.0, 2.0])
+        np.repeat(rng.choice(each, samples // 20), 20) for each in ([-4.0, 0.0, 4.0, 8.0], levels)
     )
     time, parts = STEP * np.arange(samples), 10
     fine = STEP / parts * np.arange(samples * parts)
@@ -122,6 +122,22 @@ def test_inputs_in_each_others_columns_beside_a_cause():
     verdict = sd.diagnose(swapped(record(7, a=1.4), "power", "second"), model())
     assert {each.id for each in verdict.named} == {"exchanged:power/second", "loss"}
     assert verdict.named[0].sentence == "the inputs power and second have each other's columns"
+
+
+@pytest.mark.parametrize("held", [0.0, 2.0])
+def test_an_input_that_never_moves_may_hold_the_column_of_one_that_does(held):
+    verdict = sd.diagnose(swapped(record(7, levels=(held,)), "power", "second"), model())
+    assert [each.id for each in verdict.named] == ["exchanged:power/second"]
+
+
+def test_in_an_input_that_is_trusted_no_error_is_considered():
+    given = record(6)
+    columns = {**given.columns, "power": -given.columns["power"]}
+    trusting = dataclasses.replace(model(), trusted_inputs=["power"])
+    verdict = sd.diagnose(sd.Record(given.time, columns), trusting)
+    assert not any("input:" in each or "exchanged:" in each for each in verdict.explanations)
+    with pytest.raises(sd.ModelError, match="trusted_inputs names the input 'pwer', which is not there"):
+        dataclasses.replace(model(), trusted_inputs=["pwer"])
 
 
 def test_several_threads_change_nothing():
