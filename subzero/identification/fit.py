@@ -265,7 +265,8 @@ def _best_size(problem: Problem, linear: Linear, products: Products, levels: Lev
         there = at(log)
         return -solve(total, linear.entries, there, off)[1] - log_levels(problem, linear.terms, there)
 
-    found = minimize_scalar(negative, bounds=SIZE_RANGE, method="bounded", options={"xatol": 0.05})
+    with np.errstate(invalid="ignore"):  # sizes at which nothing can be solved have no evidence: ∞ − ∞
+        found = minimize_scalar(negative, bounds=SIZE_RANGE, method="bounded", options={"xatol": 0.05})
     return at(float(found.x))
 
 
