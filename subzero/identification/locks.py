@@ -31,6 +31,8 @@ FITTED_SHARE = 0.6
 """Share of a single record that is fitted, where the rest is predicted. [-]"""
 FEWEST_GAPS = 4.0
 """A part that is left out is no longer than a record over this. [-]"""
+MOST = 0.5
+"""Where unknown inputs act for a longer share of the time, nothing else is named: too little bears witness to it. [-]"""
 BLOCKS, DRAWS, SURE = 20, 2000, 0.05
 """Blocks of a record, draws of the bootstrap, and the share of them outside an interval, to either side."""
 
@@ -84,17 +86,30 @@ def locks(problem: Problem, best: Fit, held_out: Sequence[Record]) -> dict[str, 
         gains |= _gains(problem, best, histories, _with_gaps(problem, gap))
     if others:
         gains |= _gains(problem, best, others, _folds(problem, held_out, split, gap))
-    return {term.id: _locks(problem, term, gains.get(term.id)) for term in terms}
+    return {term.id: _locks(problem, term, terms, gains.get(term.id)) for term in terms}
 
 
-def _locks(problem: Problem, term: Term, gain: Gain | None) -> Locks:
+def _locks(problem: Problem, term: Term, terms: Sequence[Term], gain: Gain | None) -> Locks:
     reasons = [f"{name} may as well act late or early" for name in _late_commands(problem, term)]
+    if term.kind != "unknown" and _share_unknown(problem, terms) > MOST:
+        reasons.append("an unknown input acts for most of the time, without which the model is not near")
     if gain is not None and not gain.holds:
         reasons.append(
             f"it does not surely predict {gain.what}: {gain.before:.2f} levels of the sensors without it, "
             f"{gain.after:.2f} with it"
         )
     return Locks(gain, tuple(reasons))
+
+
+def _share_unknown(problem: Problem, terms: Sequence[Term]) -> float:
+    """Return the share of the time in which unknown inputs act that terms say. [-]"""
+    acts = [
+        min(term.ends, record.time[-1]) - max(term.begins, record.time[0])
+        for term in terms
+        for k, record in enumerate(problem.records)
+        if term.kind == "unknown" and term.record in (-1, k)
+    ]
+    return float(sum(acts) / sum(np.ptp(record.time) for record in problem.records))
 
 
 def _late_commands(problem: Problem, term: Term) -> list[str]:

@@ -4,6 +4,7 @@ how far parameters that it does not name are from their nominal values.
     R = rms(residual) / level of the sensor     after the unknown inputs, and in a free simulation without them
     size / declared size                            of every unknown input that no term names
     |θ − c| / τ                                     of every parameter that no term names
+    rms(residual), histories of unknown inputs at 0         of a channel that another unit makes small
 
 Where one of them is large, no cause and no error in the data is named, whatever its probability: evidence compares
 explanations with each other, not with the truth (Kennedy & O'Hagan 2001; Brynjarsdóttir & O'Hagan 2014).
@@ -11,6 +12,7 @@ explanations with each other, not with the truth (Kennedy & O'Hagan 2001; Brynja
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +27,9 @@ NEAR_SIZE = 3.0
 """Largest ratio of an unknown input's size to the declared one. [-]"""
 NEAR_BEND = 4.0
 """Farthest that a parameter which is not named may be from its nominal value, in tolerances. [-]"""
+
+QUIET = 3.0
+"""A channel that shows no more than noise is not so many times quieter than its sensor. [-]"""
 
 SOFT_KINDS = ("offset", "scale", "drift")
 """Kinds of errors in the data that an error of a model looks like."""
@@ -102,6 +107,10 @@ def nearness(problem: Problem, fitted: Fit, free: Fit) -> Nearness:
         for name, bend in bends.items()
         if bend > NEAR_BEND
     ]
+    reasons += [
+        f"{name} is not explained, however small another unit makes it"
+        for name in _unlike(problem, fitted)
+    ]
     if _errs_everywhere(problem, fitted):
         reasons.append(
             "every sensor has to be off (by an offset, a scale or a drift): none agrees with the model"
@@ -115,6 +124,28 @@ def _errs_everywhere(problem: Problem, fitted: Fit) -> bool:
     """
     soft = {term.target for term in fitted.terms if term.kind in SOFT_KINDS}
     return len(problem.channels) > 1 and soft >= set(problem.channels)
+
+
+def _unlike(problem: Problem, fitted: Fit) -> Iterator[str]:
+    """Yield the channels that an explanation divides by a factor, and that the model then does not explain by itself,
+    histories of unknown inputs and drifts at 0: whatever is made small enough is near any simulation.
+
+    What shows no more than noise must then have the noise that its sensor has.
+    """
+    x = np.where([entry.kind in ("unknown", "drift") for entry in fitted.entries], 0.0, fitted.x)
+    found, _ = problem.residuals(fitted.terms, fitted.entries, [x])
+    for term in fitted.terms:
+        if term.kind not in ("unit", "affine") or abs(term.factor) <= 1.0:
+            continue
+        name, each = term.target, problem.readings_of(term.target, fitted.terms)
+        at = problem.where(each, term) & problem.used(name, fitted.terms)
+        level, left = problem.levels(fitted.terms)[name], rms(found[name][at, 0])
+        most = NEAR_LEFT * _most(problem, name, level)
+        shown = problem.recorded(name, fitted.terms)[at]
+        if problem.model.channels[name].angle or term.offset:  # its zero says nothing
+            shown = shown - np.mean(shown)
+        if not left <= most or (rms(shown) <= most and QUIET * left < level):
+            yield name
 
 
 def follows(problem: Problem, fitted: Fit) -> bool:

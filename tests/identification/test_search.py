@@ -4,10 +4,13 @@ Verifies: a limit that does nothing near its nominal value is found; so is a ste
 nearly make up for. Truth is the model with other numbers. Tolerance: 3 standard deviations of the verdict.
 """
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 import subzero.diagnosis as sd
+from tests.identification.oscillator import model, record
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -88,3 +91,31 @@ def test_no_model_is_asked_for_a_number_beyond_its_bounds(drag):
     v = slowed(true, force, time)["v"] + 0.02 * rng.standard_normal(300)
     (found,) = sd.diagnose(sd.Record(time, {"v": v, **force}), model).named
     assert found.id == "less@"
+
+
+@pytest.mark.parametrize("seed, size", [(0, 30.0), (1, 300.0)])
+def test_a_channel_that_another_unit_makes_small_is_not_explained_by_that(seed, size):
+    """A wander that has nothing to do with the model: divided by a hundred, with a drift, it is near anything."""
+    given, rng = record(seed), np.random.default_rng(seed)
+    wander = size * given.time / 30.0 + size / 2000.0 * np.cumsum(rng.standard_normal(given.time.size))
+    x = wander + 0.05 * rng.standard_normal(given.time.size)
+    verdict = sd.diagnose(
+        sd.Record(given.time, {"x": x, "force": given.columns["force"]}), model(unknown=False)
+    )
+    assert verdict.verdict == "nothing_near"
+    assert "x is not explained, however small another unit makes it" in verdict.nearness.reasons
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_nothing_else_is_named_beside_an_input_that_acts_most_of_the_time(seed):
+    """A heavy second mass and a lag: with any force at all the model follows, and what else it needs is an artefact."""
+    given = record(seed, second=0.3)
+    late = np.interp(given.time - 0.25, given.time, given.columns["x"])
+    free = dataclasses.replace(
+        model(unknown=False), unknown=[sd.Unknown("command:force", size=0.5, time=0.5, usual=False)]
+    )
+    verdict = sd.diagnose(sd.Record(given.time, {"x": 1.3 * late, "force": given.columns["force"]}), free)
+    assert [each.id for each in verdict.named] == ["unknown:command:force"]
+    assert any(
+        "an unknown input acts for most of the time" in "".join(each.against) for each in verdict.suspected
+    )
