@@ -7,7 +7,8 @@ By the engine for any model, given as the tethered vehicle (`subzero2`):
     numbers  `subzero2` with 3 % (one standard deviation) on every number of the vehicle, the cable and the drum, by the
              other formulation of the cable, manoeuvres and noise of the world; in trim, as the nominal vehicle is: the
              centre of buoyancy remains above the centre of gravity (3 % of either's place alone, measured from the
-             middle of the hull, would be three tolerances of `cg_offset`, a cause that is rightly named)
+             middle of the hull, would be three tolerances of `cg_offset`, a cause that is rightly named), and the cable's
+             weight in water remains
 
 Each name of a cause or of an error in the data is an invention.
 """
@@ -126,10 +127,13 @@ def _off(model: Model, rng: np.random.Generator) -> dict[str, Any]:
         for part in ("cable", "drum")
     )
     vehicle = off(to_mapping(model.vehicle))
+    cable = off(cable)
+    # As buoyant as before: 3 % of the mass or the diameter alone are three or six tolerances of `cable_weight`.
+    cable["mass_per_length"] = model.cable.mass_per_length * (cable["diameter"] / model.cable.diameter) ** 2
     vehicle["buoyancy"]["centre_of_buoyancy_x"] = vehicle["rigid_body"]["centre_of_gravity_x"]
     return {
         "vehicle": from_mapping(vehicle),
-        "cable": CableProperties(water_density=model.cable.water_density, **off(cable)),
+        "cable": CableProperties(water_density=model.cable.water_density, **cable),
         "drum": DrumProperties(**off(drum)),
     }
 
