@@ -7,10 +7,11 @@ By the engine for any model, given as the tethered vehicle (`subzero2`):
     numbers  `subzero2` with 3 % (one standard deviation) on every number of the vehicle, the cable and the drum, by the
              other formulation of the cable, manoeuvres and noise of the world; in trim, as the nominal vehicle is: the
              centre of buoyancy remains above the centre of gravity (3 % of either's place alone, measured from the
-             middle of the hull, would be three tolerances of `cg_offset`, a cause that is rightly named), and the cable's
-             weight in water remains
+             middle of the hull, would be three tolerances of `cg_offset`, a cause that is rightly named), and the
+             cable's weight in water remains
 
-Each name of a cause or of an error in the data is an invention.
+Each name of a cause or of an error in the data is an invention. That something acts which is no cause is none: the
+model misses it.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ import scenarios
 import subzero
 from cable import CableProperties, DrumProperties
 from subzero import identification
+from subzero.diagnosis.api import SEARCH_S
 from subzero.diagnosis.hypothesis.catalogue import NOISE
 from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
@@ -156,7 +158,7 @@ def said(kind_made: tuple[str, Any]) -> tuple[str, str, identification.Verdict |
         return kind, f"{made}: {error}", None, 0.0
     begun = process_time()
     model, records = vehicle_model([logged])
-    verdict = identification.diagnose(records, model)
+    verdict = identification.diagnose(records, model, seconds=SEARCH_S)
     return kind, logged.name if kind == "numbers" else Path(made).stem, verdict, process_time() - begun
 
 
@@ -176,11 +178,12 @@ def benchmark(*, data: Path | None = None, count: int = 50, seed: int = 1, worke
             if verdict is None:
                 print(f"  {kind:8} {name}", flush=True)
                 continue
-            total, invented = total + 1, invented + bool(verdict.named)
+            is_invented = any(not each.history for each in verdict.named)
+            total, invented = total + 1, invented + is_invented
             names = ", ".join(f"{each.id} {each.probability:.3f}" for each in verdict.named) or "nothing"
-            mark = "!" if verdict.named else " "
+            mark = "!" if is_invented else " "
             print(f"{mark} {kind:8} {name:24} {verdict.verdict:14} {names} {seconds:.0f} s", flush=True)
-    print(f"{total} records: something is named in {invented}")
+    print(f"{total} records: a cause or an error in the data is named in {invented}")
 
 
 if __name__ == "__main__":

@@ -32,7 +32,7 @@ FITTED_SHARE = 0.6
 FEWEST_GAPS = 4.0
 """A part that is left out is no longer than a record over this. [-]"""
 MOST = 0.5
-"""Where unknown inputs act for a longer share of the time, nothing else is named: too little bears witness to it. [-]"""
+"""Where unknown inputs act for a longer share of the time, nothing else is named: too little bears witness. [-]"""
 BLOCKS, DRAWS, SURE = 20, 2000, 0.05
 """Blocks of a record, draws of the bootstrap, and the share of them outside an interval, to either side."""
 

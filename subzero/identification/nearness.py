@@ -108,8 +108,7 @@ def nearness(problem: Problem, fitted: Fit, free: Fit) -> Nearness:
         if bend > NEAR_BEND
     ]
     reasons += [
-        f"{name} is not explained, however small another unit makes it"
-        for name in _unlike(problem, fitted)
+        f"{name} is not explained, however small another unit makes it" for name in _unlike(problem, fitted)
     ]
     if _errs_everywhere(problem, fitted):
         reasons.append(
