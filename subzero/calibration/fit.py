@@ -23,6 +23,7 @@ from scipy.stats.qmc import Sobol
 
 from subzero.calibration.numbers import STEP_SHARE
 from subzero.diagnosis.inference import (
+    SETTLED_GAIN,
     Fit,
     Problem,
     Progress,
@@ -32,7 +33,7 @@ from subzero.diagnosis.inference import (
     economical,
     objective,
     posterior,
-    quadratic_step,
+    refit,
     runnable,
     with_finer_steps,
     with_residual_noise,
@@ -56,19 +57,6 @@ MAX_LOWERINGS, FAILED_SHARE = 5, 0.9
 """Noise is lowered so often; no more where the misfit remains above this share of its former value. [-]"""
 FIRST_MISFIT = 2.0
 """A fit begins with so much noise that it leaves the vehicle so many levels off. [-]"""
-FIRST_STEPS = 10
-"""Steps of a fit that only leads to the next, at most."""
-MAX_STEPS = 25
-"""Steps of a fit, at most."""
-SETTLED_GAIN = 0.3
-"""A fit has settled when the linear problem predicts a gain of less than this. [nat]"""
-LEAST_SHARE, FRESH_SHARE = 0.05, 0.5
-"""A step that gains less than the first share of the predicted gain is not taken; after one that gains less than the
-second, sensitivities are computed again. [-]"""
-FIRST_DAMPING, LEAST_DAMPING = 1.0, 0.1
-"""Damping of a step that failed, in inverse prior variances, and the damping that counts as zero. [-]"""
-OWN_WITHIN = 0.3
-"""Sensitivities will do for a first fit if they were made so close to it, in tolerances."""
 MAX_NOISE_ROUNDS = 2
 """How often the noise is estimated."""
 
@@ -103,26 +91,26 @@ def fitted(problem: Problem, free: int, D: np.ndarray, progress: Progress) -> Fi
     """
     first, spread, repeated = _first(problem, free, D, progress)
     progress(0.5, "fit with usual noise")
-    fit = _settled(problem, first, D)
+    fit = refit(problem, first, D, precise=True)
     for round in range(MAX_NOISE_ROUNDS):
         progress(0.6 + 0.1 * round, "noise behind the fit")
         again = with_residual_noise(problem, fit.z, D)
         if again is None:
             break
         problem = again
-        fit = _settled(problem, fit.z, D)
+        fit = refit(problem, fit.z, D, precise=True)
     progress(0.8, "errors of the time steps")
     corrected = with_finer_steps(problem, fit.z)
     if corrected is not None:
         problem = corrected
-        fit = _settled(problem, fit.z, D)
+        fit = refit(problem, fit.z, D, precise=True)
     for round in range(MAX_CHECKS):
         progress(0.85 + 0.05 * round, "ends of the intervals")
         M = covariance(problem, fit)
         wider, better = ends_checked(problem, fit, M, free)
         if better is None:
             break
-        fit = _settled(problem, better, D)
+        fit = refit(problem, better, D, precise=True)
     settled = better is None and is_settled(problem, fit, M, free)
     wider = np.maximum(wider, spread) * wider_by_rows(problem, fit, M)
     M = wider[:, None] * M * wider
@@ -251,11 +239,11 @@ def _fit_from(problem: Problem, z: np.ndarray, D: np.ndarray, shares: Sequence[f
             if not np.isfinite(misfit):
                 break
             factor = max(misfit / FIRST_MISFIT, 1.0)
-            fit = _settled(with_more_noise(short, factor), z, D, is_first=True)
+            fit = refit(with_more_noise(short, factor), z, D)
             z = fit.z
             if factor == 1.0 or factor * np.sqrt(np.mean(fit.r**2)) > FAILED_SHARE * misfit:
                 break
-    return _settled(problem, z, D, is_first=True)
+    return refit(problem, z, D)
 
 
 def beginnings(problem: Problem, share: float) -> Problem:
@@ -271,60 +259,6 @@ def beginnings(problem: Problem, share: float) -> Problem:
             noise[name] = replace(old, used=used, time=record.time[used])
         records.append(replace(record, noise=noise, setting=economical(record.setting, end)))
     return replace(problem, records=tuple(records))
-
-
-def _settled(problem: Problem, z: np.ndarray, D: np.ndarray, *, is_first: bool = False) -> Fit:
-    """Return a fit with sensitivities of its own.
-
-    A first one, which only leads to the next, takes fewer steps, and makes do with one-sided sensitivities close by.
-
-    Levenberg's and Marquardt's method within bounds (Nielsen 1999): where numbers trade against each other the best fit
-    lies at the end of a curved valley, and a whole step of Gauss and Newton, or a part of it, leaves it.
-    """
-    low, high = bounds(problem)
-    slopes, within = (problem.jacobian, OWN_WITHIN) if is_first else (problem.central_jacobian, 0.0)
-    z, r = runnable(problem, z, None)
-    J, made_at = slopes(z), z
-    now, damping, harder, left = objective(r, z, D), 0.0, 2.0, 0.0
-    for _ in range(FIRST_STEPS if is_first else MAX_STEPS):
-        P, g = J.T @ J + np.diag((1.0 + damping) / D), J.T @ r - z / D
-        step = quadratic_step(P, g, low - z, high - z)
-        left = now - objective(r - J @ step, z + step, D)
-        fresh = made_at is z
-        if left < SETTLED_GAIN and damping < 1.0:
-            if fresh or _apart(problem, z, made_at) < within:
-                break
-            J, made_at = slopes(z), z
-            continue
-        r_there = problem.residual(z + step)
-        then = objective(r_there, z + step, D)
-        share = (now - then) / left if left > 0.0 else 0.0
-        if share > LEAST_SHARE:
-            J = broyden_update(J, step, r_there - r, D)
-            z, r, now = z + step, r_there, then
-            damping *= max(1.0 / 3.0, 1.0 - (2.0 * share - 1.0) ** 3)
-            damping, harder = (damping if damping > LEAST_DAMPING else 0.0), 2.0
-        elif fresh:
-            damping, harder = max(damping, FIRST_DAMPING) * harder, 2.0 * harder
-        if share < FRESH_SHARE and not fresh:
-            J, made_at = slopes(z), z
-    return Fit(
-        z=z,
-        r=r,
-        J=J,
-        D=D,
-        objective=now,
-        converged=left < SETTLED_GAIN,
-        predicted_gain=left,
-        fresh=0,
-        made_at=made_at,
-    )
-
-
-def _apart(problem: Problem, z: np.ndarray, other: np.ndarray) -> float:
-    """Return how far two points are apart, in tolerances."""
-    tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
-    return float(np.max(np.abs(z - other) / tolerance))
 
 
 def with_more_noise(problem: Problem, factor: float) -> Problem:

@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from subzero.calibration.assessment import _without, directions
-from subzero.calibration.fit import Fitted, _settled, covariance, held_at
+from subzero.calibration.fit import Fitted, covariance, held_at
 from subzero.calibration.numbers import Number
 from subzero.diagnosis import Effect, Parameter
-from subzero.diagnosis.inference import Fit, Noise, Observed, Problem, entries_of
+from subzero.diagnosis.inference import Fit, Noise, Observed, Problem, entries_of, refit
 
 ROWS, SAMPLES = 60, 30
 
@@ -64,7 +64,7 @@ def drawn():
 
 
 def fit_of(problem, D, start=0.0):
-    fit = _settled(problem, np.full(D.size, start), D)
+    fit = refit(problem, np.full(D.size, start), D, precise=True)
     assert fit.converged
     return fit
 
@@ -102,8 +102,7 @@ def test_what_lasts_through_blocks_widens_by_the_root_of_their_length():
     record = Observed(name="one", time=time, values={}, noise={"heading": noise}, setting=None)
     r = np.repeat(np.resize([1.0, -1.0], count), length)
     J, D = np.ones((time.size, 1)), np.array([1e12])
-    fit = Fit(z=np.zeros(1), r=r, J=J, D=D, objective=0.5 * float(r @ r), converged=True, predicted_gain=0.0, fresh=0,
-              made_at=np.zeros(1))  # fmt: skip
+    fit = Fit(z=np.zeros(1), r=r, J=J, D=D, objective=0.5 * float(r @ r), converged=True)
     found = covariance(linear(J, r, (record,)), fit)
     assert found[0, 0] == pytest.approx(length / time.size, rel=0.02)
 

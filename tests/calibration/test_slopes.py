@@ -87,8 +87,7 @@ def test_at_a_bound_no_run_is_made_beyond_it():
 def checked(kind):
     one, D = problem(1, kind), np.array([100.0])
     r = one.residual(np.zeros(1))
-    fit = Fit(z=np.zeros(1), r=r, J=np.array([[10.0]]), D=D, objective=0.5 * float(r @ r), converged=True,
-              predicted_gain=0.0, fresh=0, made_at=np.zeros(1))  # fmt: skip
+    fit = Fit(z=np.zeros(1), r=r, J=np.array([[10.0]]), D=D, objective=0.5 * float(r @ r), converged=True)
     return ends_checked(one, fit, np.array([[0.01]]), 1)
 
 
@@ -99,8 +98,7 @@ def test_a_fit_has_settled_if_the_whole_step_moves_no_calibrated_number(entry, o
     """However little the damped step of a fit would gain; by so many standard deviations of 0.1; a start may move."""
     one, D, z = problem(2, Straight), np.full(2, 100.0), np.zeros(2)
     z[entry] = 0.1 * off
-    fit = Fit(z=z, r=one.residual(z), J=10.0 * np.eye(2), D=D, objective=0.0, converged=True, predicted_gain=0.0,
-              fresh=0, made_at=z)  # fmt: skip
+    fit = Fit(z=z, r=one.residual(z), J=10.0 * np.eye(2), D=D, objective=0.0, converged=True)
     assert is_settled(one, fit, 0.01 * np.eye(2), free) == settled
 
 
@@ -143,8 +141,7 @@ def test_an_interval_holds_what_outliers_in_a_row_would_make_of_it_and_not_what_
     record = Levels(time, {"depth": values}, {"depth": Noise(white=1.0, used=used, time=time[used])})
     one, D = dataclasses.replace(problem(1, Level), records=(record,)), np.array([1e6])
     z = np.zeros(1)
-    fit = Fit(z=z, r=one.residual(z), J=np.ones((97, 1)), D=D, objective=0.0, converged=True, predicted_gain=0.0,
-              fresh=0, made_at=z)  # fmt: skip
+    fit = Fit(z=z, r=one.residual(z), J=np.ones((97, 1)), D=D, objective=0.0, converged=True)
     assert wider_by_rows(one, fit, np.array([[0.01]])) == pytest.approx([factor], rel=1e-3)
 
 

@@ -34,9 +34,7 @@ class Planted(NamedTuple):
     def fit(self, *ids: str) -> Fit:
         """Return the fit of named causes."""
         zero = np.zeros(len(self.problem.entries))
-        return refit(
-            self.problem, zero, self.J, variances(self.problem.entries, ids, 1.0), r=self.r, most_fresh=1
-        )
+        return refit(self.problem, zero, variances(self.problem.entries, ids, 1.0), J=self.J)
 
 
 def coloured(random: np.random.Generator, size: int) -> np.ndarray:

@@ -55,6 +55,7 @@ from subzero.diagnosis.inference.linear_gaussian import (
     seen,
 )
 from subzero.diagnosis.inference.map_fit import (
+    SETTLED_GAIN,
     Fit,
     bounded_step,
     bounds,
@@ -94,6 +95,7 @@ from subzero.diagnosis.inference.force_formula import Formula, describe
 __all__ = [
     "AXIS_WORDS",
     "MAX_DRIFT_LEVELS",
+    "SETTLED_GAIN",
     "TRUTHS",
     "EstimatedForce",
     "Fit",

@@ -34,7 +34,7 @@ from subzero.diagnosis.inference.linear_gaussian import (
     posterior,
     seen,
 )
-from subzero.diagnosis.inference.map_fit import Fit, refit, with_own_jacobian
+from subzero.diagnosis.inference.map_fit import Fit, refit
 from subzero.diagnosis.results import Unknown
 
 if TYPE_CHECKING:
@@ -84,7 +84,6 @@ def estimate_force(
     D: np.ndarray | None = None,
     *,
     spacing: float = FINE_SPACING_S,
-    most_fresh: int = 2,
 ) -> EstimatedForce:
     """Return the history of a force on an axis.
 
@@ -94,7 +93,6 @@ def estimate_force(
         axis: X, Y, Z, K, M or N.
         D: prior variances of the problem's entries (k,); those of the fit if None.
         spacing: of the knots. [s]
-        most_fresh: how many times sensitivities may be computed again on the way.
     """
     D = fit.D if D is None else D
     knots = knots_of(problem, spacing)
@@ -103,8 +101,7 @@ def estimate_force(
     more = with_force(problem, axis, knots, L, 1.0)
     whole, J = np.concatenate([D, np.ones(L.shape[1])]), np.hstack([fit.J, C @ L])
     start = _linear(fit, J, whole)
-    made_at = None if fit.made_at is None else np.concatenate([fit.made_at, np.zeros(L.shape[1])])
-    done = with_own_jacobian(more, refit(more, start.z, J, whole, most_fresh=most_fresh, made_at=made_at))
+    done = refit(more, start.z, whole, J=J)
     found = posterior(done.quadratic, whole)
     k = D.size
     force, covariance = L @ done.z[k:], L @ found.M[k:, k:] @ L.T
@@ -192,5 +189,4 @@ def fit_with_drift(problem: Problem, found: EstimatedForce, D: np.ndarray) -> Fi
     cleared = replace(problem, records=tuple(records))
     J, left = start.J, start.r + start.J @ start.z - found.columns @ found.force
     there = posterior(Quadratic(A=J.T @ J, b=J.T @ left, rr=float(left @ left)), D).z
-    done = refit(cleared, there, J, D, most_fresh=1, made_at=start.made_at)
-    return with_own_jacobian(cleared, done)
+    return refit(cleared, there, D, J=J)

@@ -1,15 +1,15 @@
-"""The MAP fit of an explanation with real simulations, by bounded, damped Gauss-Newton with Broyden updates.
+"""The MAP fit of an explanation with real simulations: Levenberg's and Marquardt's method within bounds (Nielsen 1999).
 
     objective = ½ |r(z)|² + ½ zᵀ D⁻¹ z,   low ≤ z ≤ high
 
-A step is the optimum of the linear model within bounds, or the part of it that gains; `broyden_update` updates J
-after it.
+Where numbers trade against each other the best fit lies at the end of a curved valley, and a whole step of Gauss and
+Newton, or a part of it, leaves it. `broyden_update` updates J after a step.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,56 +18,17 @@ from subzero.diagnosis.inference.linear_gaussian import Quadratic
 if TYPE_CHECKING:
     from subzero.diagnosis.inference.problem import Problem
 
-MAX_STEPS = 8
-"""Most steps of a fit."""
-NEGLIGIBLE_GAIN_NATS, CONVERGED_GAIN_NATS = 0.1, 0.5
-"""A step that is predicted to gain less is not tried; a fit whose next step would gain less has converged."""
-STALE_GAIN_SHARE = 0.5
-"""A step that gains less than this share of its predicted gain asks for a new Jacobian. [-]"""
-OWN_JACOBIAN_TOLERANCES = 1.0
-"""A Jacobian made this close to a fit is its own. [τ]"""
-
-
-class Step(NamedTuple):
-    """A step: the largest gain that the linear model predicted; the gain that it predicted for the last step tried;
-    the share of that which was achieved; the new point, with its residual and objective.
-    """
-
-    predicted: float
-    left: float
-    share: float
-    z: np.ndarray
-    r: np.ndarray
-    now: float
-
-
-def damped_step(
-    problem: Problem, z: np.ndarray, r: np.ndarray, now: float, J: np.ndarray, D: np.ndarray
-) -> Step:
-    """Return the optimal step of the linear model within bounds; if that gains nothing, the one with the non-smooth
-    entries held; none where no more than NEGLIGIBLE_GAIN_NATS is predicted.
-    """
-    low, high = bounds(problem)
-    predicted = 0.0
-    for bound in ((low, high), _held(z, low, high)):
-        step = bounded_step(J, r, z, D, *bound)
-        left = now - objective(r - J @ step, z + step, D)
-        predicted = max(predicted, left)
-        if left < NEGLIGIBLE_GAIN_NATS:
-            break
-        share, there, r_there, then = _walk(problem, z, r, now, step, left, D)
-        if share > 0.0:
-            return Step(predicted, left, share, there, r_there, then)
-    return Step(predicted, left, 0.0, z, r, now)
-
-
-def _held(z: np.ndarray, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return bounds that hold all one-sided entries at their present values: where a drum stops, a cable falls slack
-    or a gear has play, simulations have non-smooth points, and a step across one spoils the gain of the other
-    entries.
-    """
-    one_sided = low == 0.0
-    return np.where(one_sided, z, low), np.where(one_sided, z, high)
+FIRST_STEPS, MAX_STEPS = 10, 25
+"""Steps of a fit that only leads to the next, or is reported as it is; and of a precise one."""
+OWN_WITHIN = 0.3
+"""Sensitivities will do, but for a precise fit, if they were made so close to it, in tolerances."""
+SETTLED_GAIN = 0.3
+"""A fit has settled when the linear problem predicts a gain of less than this. [nat]"""
+LEAST_SHARE, FRESH_SHARE = 0.05, 0.5
+"""A step that gains less than the first share of the predicted gain is not taken; after one that gains less than the
+second, sensitivities are computed again. [-]"""
+FIRST_DAMPING, LEAST_DAMPING = 1.0, 0.1
+"""Damping of a step that failed, in inverse prior variances, and the damping that counts as zero. [-]"""
 
 
 def broyden_update(J: np.ndarray, step: np.ndarray, change: np.ndarray, D: np.ndarray) -> np.ndarray:
@@ -76,25 +37,6 @@ def broyden_update(J: np.ndarray, step: np.ndarray, change: np.ndarray, D: np.nd
     """
     weighted = step / D
     return J + np.outer(-change - J @ step, weighted / (step @ weighted))
-
-
-def _walk(
-    problem: Problem,
-    z: np.ndarray,
-    r: np.ndarray,
-    now: float,
-    step: np.ndarray,
-    predicted: float,
-    D: np.ndarray,
-) -> tuple[float, np.ndarray, np.ndarray, float]:
-    """Return the share of the predicted gain that a step, or a part of it, achieves; and the new point."""
-    for part in (1.0, 0.4, 0.1):
-        there = z + part * step
-        r_there = problem.residual(there)
-        then = objective(r_there, there, D)
-        if then < now:
-            return (now - then) / predicted, there, r_there, then
-    return 0.0, z, r, now
 
 
 def objective(r: np.ndarray, z: np.ndarray, D: np.ndarray) -> float:
@@ -150,9 +92,6 @@ class Fit:
         D: prior variances (k,).
         objective: ½|r|² + ½ zᵀD⁻¹z.
         converged: no step would gain more.
-        predicted_gain: of a further step by the linear model; unreliable with old sensitivities.
-        fresh: how many times sensitivities were computed.
-        made_at: linearisation point of the sensitivities, if that is known (k,).
     """
 
     z: np.ndarray
@@ -161,23 +100,11 @@ class Fit:
     D: np.ndarray
     objective: float
     converged: bool
-    predicted_gain: float
-    fresh: int
-    made_at: np.ndarray | None = None
 
     @property
     def quadratic(self) -> Quadratic:
         """The linear problem around the fit."""
         return Quadratic.at(self.z, self.r, self.J)
-
-    def moved(self, problem: Problem) -> float:
-        """Return the distance from the linearisation point of its sensitivities, in tolerances; infinite if that is
-        not known.
-        """
-        if self.made_at is None:
-            return np.inf
-        tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
-        return float(np.max(np.abs(self.z - self.made_at) / tolerance))
 
 
 EXCESS_SIGMAS = 6.0
@@ -189,59 +116,77 @@ def is_noise(r: np.ndarray) -> bool:
     return bool(r @ r <= r.size + EXCESS_SIGMAS * np.sqrt(2.0 * r.size))
 
 
-def with_own_jacobian(problem: Problem, fit: Fit) -> Fit:
-    """Return a fit repeated with sensitivities of its own, if it has moved from the linearisation point of its
-    sensitivities.
-    """
-    if fit.moved(problem) < OWN_JACOBIAN_TOLERANCES:
-        return fit
-    return refit(problem, fit.z, problem.jacobian(fit.z), fit.D, r=fit.r, most_fresh=0, made_at=fit.z)
-
-
 def refit(
-    problem: Problem,
-    z: np.ndarray,
-    J: np.ndarray,
-    D: np.ndarray,
-    *,
-    r: np.ndarray | None = None,
-    most_fresh: int = 1,
-    made_at: np.ndarray | None = None,
+    problem: Problem, z: np.ndarray, D: np.ndarray, *, J: np.ndarray | None = None, precise: bool = False
 ) -> Fit:
-    """Return the best fit under prior variances D, from z and sensitivities J close by.
+    """Return the best fit under prior variances D (k,), with sensitivities of its own.
 
     Args:
         problem: records and parameters.
         z: the start (k,).
-        J: sensitivities at the start (m, k).
         D: prior variances (k,).
-        r: the residual at z, if it is known.
-        most_fresh: how many times sensitivities may be computed again.
-        made_at: linearisation point of J (k,).
+        J: sensitivities near the start (m, k), if they are known.
+        precise: to the end, with central sensitivities at it; else one-sided ones close by will do.
     """
-    z, r = runnable(problem, np.clip(z, *bounds(problem)), r)
-    now, fresh, converged, left = objective(r, z, D), 0, False, 0.0
-    for _ in range(MAX_STEPS):
-        step = damped_step(problem, z, r, now, J, D)
-        if step.share > 0.0:
-            J = broyden_update(J, step.z - z, step.r - r, D)
-        z, r, now, left = step.z, step.r, step.now, step.left
-        if step.share < STALE_GAIN_SHARE and step.predicted > CONVERGED_GAIN_NATS and fresh < most_fresh:
-            J, fresh, made_at = problem.jacobian(z), fresh + 1, z.copy()
-        elif step.share <= 0.0:
-            converged = left < CONVERGED_GAIN_NATS
-            break
-    return Fit(
-        z=z,
-        r=r,
-        J=J,
-        D=D,
-        objective=now,
-        converged=converged,
-        predicted_gain=0.0 if converged else left,
-        fresh=fresh,
-        made_at=made_at,
+    slopes, within, most = (
+        (problem.central_jacobian, 0.0, MAX_STEPS) if precise else (problem.jacobian, OWN_WITHIN, FIRST_STEPS)
     )
+    low, high = bounds(problem)
+    z, r = runnable(problem, np.clip(z, low, high), None)
+    made_at = z if J is None else None
+    J = slopes(z) if J is None else J
+    now, damping, harder, left = objective(r, z, D), 0.0, 2.0, 0.0
+    for _ in range(most):
+        P, g = J.T @ J + np.diag((1.0 + damping) / D), J.T @ r - z / D
+        step = quadratic_step(P, g, low - z, high - z)
+        left = now - objective(r - J @ step, z + step, D)
+        fresh = made_at is z
+        if left < SETTLED_GAIN and damping < 1.0:
+            if fresh or _apart(problem, z, made_at) < within:
+                break
+            J, made_at = slopes(z), z
+            continue
+        r_there = problem.residual(z + step)
+        then = objective(r_there, z + step, D)
+        if fresh and damping == 0.0 and then >= now:
+            step, r_there, then = _beside(problem, z, D, P, g, (step, r_there, then))
+        share = (now - then) / left if left > 0.0 else 0.0
+        if share > LEAST_SHARE:
+            J = broyden_update(J, step, r_there - r, D)
+            z, r, now = z + step, r_there, then
+            damping *= max(1.0 / 3.0, 1.0 - (2.0 * share - 1.0) ** 3)
+            damping, harder = (damping if damping > LEAST_DAMPING else 0.0), 2.0
+        elif fresh:
+            damping, harder = max(damping, FIRST_DAMPING) * harder, 2.0 * harder
+        if share < FRESH_SHARE and not fresh:
+            J, made_at = slopes(z), z
+    return Fit(z=z, r=r, J=J, D=D, objective=now, converged=left < SETTLED_GAIN)
+
+
+Tried = tuple[np.ndarray, np.ndarray, float]
+"""A step (k,), the residual there (m,), and the objective."""
+
+
+def _beside(
+    problem: Problem, z: np.ndarray, D: np.ndarray, P: np.ndarray, g: np.ndarray, failed: Tried
+) -> Tried:
+    """Return the step with all one-sided entries held, where it is better than one that failed: where a drum stops, a
+    cable falls slack or a gear has play, simulations have non-smooth points, and a step across one spoils the gain of
+    the other entries.
+    """
+    low, high = bounds(problem)
+    held = low == 0.0
+    step = quadratic_step(P, g, np.where(held, 0.0, low - z), np.where(held, 0.0, high - z))
+    r = problem.residual(z + step)
+    return min(failed, (step, r, objective(r, z + step, D)), key=lambda tried: tried[2])
+
+
+def _apart(problem: Problem, z: np.ndarray, other: np.ndarray | None) -> float:
+    """Return how far two points are apart, in tolerances; infinite if the other one is not known."""
+    if other is None:
+        return np.inf
+    tolerance = np.array([entry.parameter.tolerance for entry in problem.entries])
+    return float(np.max(np.abs(z - other) / tolerance))
 
 
 def runnable(problem: Problem, z: np.ndarray, r: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:

@@ -35,7 +35,7 @@ from subzero.diagnosis.hypothesis.noise import (
     sensor_prior,
     spikes,
 )
-from subzero.diagnosis.inference.map_fit import CONVERGED_GAIN_NATS, Fit, bounded_step, bounds, objective
+from subzero.diagnosis.inference.map_fit import Fit, objective
 from subzero.diagnosis.inference.problem import Observed, Problem
 from subzero.diagnosis.inference.simulator import economical, finer, read, respond, with_limit
 from subzero.errors import UserError
@@ -192,16 +192,9 @@ def whitened_again(before: Problem, after: Problem, white: np.ndarray) -> np.nda
 
 
 def rewhitened(fit: Fit, before: Problem, after: Problem) -> Fit:
-    """Return a fit under the noise of another problem: its residual and its sensitivities whitened with that, and the
-    predicted gain of a step there.
-    """
+    """Return a fit under the noise of another problem: its residual and its sensitivities whitened with that."""
     r, J = whitened_again(before, after, fit.r), whitened_again(before, after, fit.J)
-    now, step = objective(r, fit.z, fit.D), bounded_step(J, r, fit.z, fit.D, *bounds(after))
-    left = now - objective(r - J @ step, fit.z + step, fit.D)
-    converged = left < CONVERGED_GAIN_NATS
-    return replace(
-        fit, r=r, J=J, objective=now, converged=converged, predicted_gain=0.0 if converged else left
-    )
+    return replace(fit, r=r, J=J, objective=objective(r, fit.z, fit.D))
 
 
 def _without_outliers(problem: Problem, record: int, z: np.ndarray) -> Observed:

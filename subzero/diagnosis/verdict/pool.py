@@ -134,7 +134,7 @@ def fitted(problem: Problem, effects: Mapping[str, Effect], explanation: Explana
                 np.append(z, [*own, 0.0]),
                 np.append(D, [e.parameter.scale**2 for e in problem.entries[D.size :]]),
             )
-    return Fitted(problem, refit(problem, z, problem.jacobian(z), D, most_fresh=1, made_at=z))
+    return Fitted(problem, refit(problem, z, D))
 
 
 def deviations(problem: Problem, fit: PoolFit) -> np.ndarray:
