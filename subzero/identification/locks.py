@@ -32,7 +32,10 @@ FITTED_SHARE = 0.6
 FEWEST_GAPS = 4.0
 """A part that is left out is no longer than a record over this. [-]"""
 MOST = 0.5
-"""Where unknown inputs act for a longer share of the time, nothing else is named: too little bears witness. [-]"""
+"""Where unknown inputs act for a longer share of the time, too little bears witness to anything else. [-]"""
+PLAIN = ("unknown", "unit", "stuck")
+"""Kinds of terms that are named all the same: a known unit is plain, also where a model follows with an input's help
+(and `nearness` sees to it that the unit is not all that explains a channel); so are equal readings."""
 BLOCKS, DRAWS, SURE = 20, 2000, 0.05
 """Blocks of a record, draws of the bootstrap, and the share of them outside an interval, to either side."""
 
@@ -91,7 +94,7 @@ def locks(problem: Problem, best: Fit, held_out: Sequence[Record]) -> dict[str, 
 
 def _locks(problem: Problem, term: Term, terms: Sequence[Term], gain: Gain | None) -> Locks:
     reasons = [f"{name} may as well act late or early" for name in _late_commands(problem, term)]
-    if term.kind != "unknown" and _share_unknown(problem, terms) > MOST:
+    if term.kind not in PLAIN and _share_unknown(problem, terms) > MOST:
         reasons.append("an unknown input acts for most of the time, without which the model is not near")
     if gain is not None and not gain.holds:
         reasons.append(

@@ -119,3 +119,20 @@ def test_nothing_else_is_named_beside_an_input_that_acts_most_of_the_time(seed):
     assert any(
         "an unknown input acts for most of the time" in "".join(each.against) for each in verdict.suspected
     )
+
+
+def test_a_known_unit_is_named_beside_an_input_that_acts_all_the_time():
+    """Of a channel that the input does not move: what explains the other one does not make this one small."""
+    model = sd.Model(
+        lambda p, u, t: {"a": p["gain"] * u["u"], "b": 0.1 * np.cumsum(u["push"])},
+        {name: sd.Sensor(noise=0.05, resolution=0.0) for name in "ab"},
+        inputs=["u"],
+        parameters=[sd.Number("gain", 1.0, tolerance=0.02)],
+        unknown=[sd.Unknown("push", size=0.5, time=2.0, usual=False)],
+    )
+    time, rng = 0.1 * np.arange(300), np.random.default_rng(5)
+    u, push = np.sin(time), 0.5 + 0.3 * np.sin(0.5 * time)
+    columns = {"a": 100.0 * (u + 0.05 * rng.standard_normal(300)), "u": u}
+    columns["b"] = 0.1 * np.cumsum(push) + 0.05 * rng.standard_normal(300)
+    verdict = sd.diagnose(sd.Record(time, columns), model)
+    assert {each.id for each in verdict.named} == {"unit:a", "unknown:push"}

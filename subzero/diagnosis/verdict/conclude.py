@@ -93,7 +93,9 @@ def concluded(asked: Asked, outcome: Outcome, detectable: tuple[Detectability, .
     """Return the verdict of a search that has ended."""
     pool, named = pool_of(outcome), names(outcome)
     best = best_of(pool, outcome)
-    errors = [(record, error) for record, error in best.errors if error.id in named]
+    said = [(record, error) for record, error in best.errors if error.id in named]
+    # A history is one of the records as the whole explanation has them, also if it alone is named.
+    errors = list(best.errors) if any(each.startswith((FORCE, DRIFT)) for each in named) else said
     problem = posed(without_errors(asked.records, errors), asked.effects, outcome.search.problem, best.fit)
     reported = fitted(problem, asked.onsets, best)
     unstable = unstable_in(problem, reported)
@@ -119,7 +121,7 @@ def concluded(asked: Asked, outcome: Outcome, detectable: tuple[Detectability, .
         sentence=_sentence(on_model, causes, rest.unknown, rivals),
         causes=causes,
         rivals=rivals,
-        data_errors=tuple(_found_errors(asked.records, errors, named)),
+        data_errors=tuple(_found_errors(asked.records, said, named)),
         probabilities=_listed(pool, outcome),
         tolerance_scale=_tolerance_scale(outcome),
         detectable=detectable,
