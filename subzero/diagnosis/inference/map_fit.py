@@ -149,7 +149,7 @@ def refit(
         r_there = problem.residual(z + step)
         then = objective(r_there, z + step, D)
         if fresh and damping == 0.0 and then >= now:
-            step, r_there, then = _beside(problem, z, D, P, g, (step, r_there, then))
+            step, r_there, then = _with_one_sided_held(problem, z, D, P, g, (step, r_there, then))
         share = (now - then) / left if left > 0.0 else 0.0
         if share > LEAST_SHARE:
             J = broyden_update(J, step, r_there - r, D)
@@ -167,7 +167,7 @@ Tried = tuple[np.ndarray, np.ndarray, float]
 """A step (k,), the residual there (m,), and the objective."""
 
 
-def _beside(
+def _with_one_sided_held(
     problem: Problem, z: np.ndarray, D: np.ndarray, P: np.ndarray, g: np.ndarray, failed: Tried
 ) -> Tried:
     """Return the step with all one-sided entries held, where it is better than one that failed: where a drum stops, a
