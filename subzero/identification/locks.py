@@ -24,6 +24,7 @@ import numpy as np
 from subzero.identification.explanation import CLOCK, Entry, Term, Terms, without
 from subzero.identification.fit import Fit, free_fit
 from subzero.identification.model import COMMAND
+from subzero.identification.nearness import rests_on_histories
 from subzero.identification.problem import FEWEST_SAMPLES, Problem
 from subzero.identification.record import Record
 
@@ -32,7 +33,7 @@ FITTED_SHARE = 0.6
 FEWEST_GAPS = 4.0
 """A part that is left out is no longer than a record over this. [-]"""
 MOST = 0.5
-"""Where unknown inputs act for a longer share of the time, too little bears witness to anything else. [-]"""
+"""Where unknown inputs act for a longer share of the time, and a channel rests on them, little bears witness. [-]"""
 PLAIN = ("unknown", "unit", "stuck")
 """Kinds of terms that are named all the same: a known unit is plain, also where a model follows with an input's help
 (and `nearness` sees to it that the unit is not all that explains a channel); so are equal readings."""
@@ -89,13 +90,16 @@ def locks(problem: Problem, best: Fit, held_out: Sequence[Record]) -> dict[str, 
         gains |= _gains(problem, best, histories, _with_gaps(problem, gap))
     if others:
         gains |= _gains(problem, best, others, _folds(problem, held_out, split, gap))
-    return {term.id: _locks(problem, term, terms, gains.get(term.id)) for term in terms}
+    rests = _share_unknown(problem, terms) > MOST and rests_on_histories(problem, best)
+    return {term.id: _locks(problem, term, gains.get(term.id), rests=rests) for term in terms}
 
 
-def _locks(problem: Problem, term: Term, terms: Sequence[Term], gain: Gain | None) -> Locks:
+def _locks(problem: Problem, term: Term, gain: Gain | None, *, rests: bool) -> Locks:
     reasons = [f"{name} may as well act late or early" for name in _late_commands(problem, term)]
-    if term.kind not in PLAIN and _share_unknown(problem, terms) > MOST:
-        reasons.append("an unknown input acts for most of the time, without which the model is not near")
+    if rests and term.kind not in PLAIN:
+        reasons.append(
+            "an unknown input acts for most of the time, without which the model explains less than half of a channel"
+        )
     if gain is not None and not gain.holds:
         reasons.append(
             f"it does not surely predict {gain.what}: {gain.before:.2f} levels of the sensors without it, "

@@ -28,6 +28,8 @@ NEAR_SIZE = 3.0
 NEAR_BEND = 4.0
 """Farthest that a parameter which is not named may be from its nominal value, in tolerances. [-]"""
 
+EXPLAINED = 0.5
+"""A model that leaves a larger share of the squares of a channel does not explain it. [-]"""
 QUIET = 3.0
 """A channel that shows no more than noise is not so many times quieter than its sensor. [-]"""
 
@@ -129,22 +131,51 @@ def _unlike(problem: Problem, fitted: Fit) -> Iterator[str]:
     """Yield the channels that an explanation divides by a factor, and that the model then does not explain by itself,
     histories of unknown inputs and drifts at 0: whatever is made small enough is near any simulation.
 
-    What shows no more than noise must then have the noise that its sensor has.
+    What shows no more than noise must then have the noise that its sensor has, with another channel that shows more.
     """
-    x = np.where([entry.kind in ("unknown", "drift") for entry in fitted.entries], 0.0, fitted.x)
-    found, _ = problem.residuals(fitted.terms, fitted.entries, [x])
+    moves = {name for name in problem.channels if _moves(problem, fitted, name)}
+    found = _without_histories(problem, fitted)
     for term in fitted.terms:
         if term.kind not in ("unit", "affine") or abs(term.factor) <= 1.0:
             continue
         name, each = term.target, problem.readings_of(term.target, fitted.terms)
         at = problem.where(each, term) & problem.used(name, fitted.terms)
-        level, left = problem.levels(fitted.terms)[name], rms(found[name][at, 0])
+        level, left = problem.levels(fitted.terms)[name], rms(found[name][at])
         most = NEAR_LEFT * _most(problem, name, level)
         shown = problem.recorded(name, fitted.terms)[at]
         if problem.model.channels[name].angle or term.offset:  # its zero says nothing
             shown = shown - np.mean(shown)
-        if not left <= most or (rms(shown) <= most and QUIET * left < level):
+        drifts = any(other.kind == "drift" and other.target == name for other in fitted.terms)
+        shows_noise, is_missed = rms(shown) <= most, not left**2 < EXPLAINED * rms(shown) ** 2
+        if (left > most and (drifts or is_missed)) or (
+            shows_noise and (QUIET * left < level or not moves - {name})
+        ):
             yield name
+
+
+def _moves(problem: Problem, fitted: Fit, name: str) -> bool:
+    """Return whether a channel shows more than noise about its mean."""
+    shown = problem.recorded(name, fitted.terms)[problem.used(name, fitted.terms)]
+    return float(np.std(shown)) > NEAR_LEFT * _most(problem, name, problem.levels(fitted.terms)[name])
+
+
+def _without_histories(problem: Problem, fitted: Fit) -> dict[str, np.ndarray]:
+    """Return channel → what an explanation leaves (m,) with unknown inputs and drifts at 0, all else as it is."""
+    x = np.where([entry.kind in ("unknown", "drift") for entry in fitted.entries], 0.0, fitted.x)
+    found, _ = problem.residuals(fitted.terms, fitted.entries, [x])
+    return {name: e[:, 0] for name, e in found.items()}
+
+
+def rests_on_histories(problem: Problem, fitted: Fit) -> bool:
+    """Return whether there is a channel of which a model explains less than half without unknown inputs and drifts."""
+    found = _without_histories(problem, fitted)
+    for name, level in problem.levels(fitted.terms).items():
+        if name in problem.channels:
+            used = problem.used(name, fitted.terms)
+            shown, left = problem.recorded(name, fitted.terms)[used], rms(found[name][used])
+            if left > NEAR_LEFT * _most(problem, name, level) and left**2 > EXPLAINED * np.var(shown):
+                return True
+    return False
 
 
 def follows(problem: Problem, fitted: Fit) -> bool:
