@@ -107,7 +107,8 @@ def _of_channel(
     e, level, turn = linear.e[name], problem.levels(linear.terms)[name], problem.model.channels[name].turn
     simulated = problem.recorded(name, linear.terms) - e
     yield from repeats(problem, name, linear.terms, simulated, data_odds(problem))
-    soft = [term for term in own if term.kind == "offset"]
+    # A model that usually misses something misses jumps, too: they are not told from steps of a sensor.
+    soft = [term for term in own if term.kind == "offset" and not problem.model.always]
     for rest in others if soft else ():
         yield from _step(rest, name, soft[0])
     before = float(np.mean(e[used] ** 2))
@@ -220,7 +221,8 @@ def _from_some_time(
     turn: float,
 ) -> Iterator[Term]:
     """Yield a known unit from the time on that fits best in each record, if there is one."""
-    for record in np.unique(each.record).tolist():
+    records = np.unique(each.record).tolist()
+    for record in records:
         at = np.flatnonzero(used & (each.record == record))
         if at.size < 2 * FEWEST_AFTER:
             continue
@@ -229,7 +231,7 @@ def _from_some_time(
         total = np.cumsum(gain[::-1])[::-1]
         best = int(np.argmax(total))
         if FEWEST_AFTER <= best <= at.size - FEWEST_AFTER and total[best] > CAPPED:
-            yield from_time(term, record, float(each.time[at[best]]), 1.0 / at.size)
+            yield from_time(term, record, float(each.time[at[best]]), 1.0 / (len(records) * at.size))
 
 
 def _step(others: _Others, name: str, term: Term) -> Iterator[Term]:
@@ -245,12 +247,13 @@ def _step(others: _Others, name: str, term: Term) -> Iterator[Term]:
     ]
     most = 0.0
     found: Term | None = None
-    for record in np.unique(each.record).tolist():
+    records = np.unique(each.record).tolist()
+    for record in records:
         at = np.flatnonzero(used & (each.record == record))
         if at.size < 2 * FEWEST_AFTER:
             continue
         begins, gain = _best_begin(others, name, at, sd)
-        late = from_time(term, record, float(each.time[at[begins]]), 1.0 / at.size)
+        late = from_time(term, record, float(each.time[at[begins]]), 1.0 / (len(records) * at.size))
         if gain + np.log(late.odds) > most:
             most, found = gain + float(np.log(late.odds)), late
     if found:
