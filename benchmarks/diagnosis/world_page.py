@@ -21,7 +21,7 @@ from .scores import Score, share, table
 
 Rows = Sequence[Mapping[str, Any]]
 SEEDS = {
-    "world": 12001,
+    "world": 5702,
     "data_errors": 12101,
     "outside": 91,
     "onsets": 3,
@@ -46,11 +46,12 @@ Measured on records that were not made for the diagnosis: any shipped manoeuvre 
 noise, healthy or with one hidden cause of any size; errors in the data; forces not in the catalogue; copies that
 differ by a hundredth of the noise. Truths come from the other formulation of the cable, with every number drawn from
 its tolerance. No choice in the program was made with these seeds before they were judged. Every record counts as it was
-first judged: two of them, 122 and 554, led to changes afterwards, and some results are of slightly earlier states of
-the program.
+first judged.
 
-**These results are of the search for causes that was replaced on 29 November 2026** by the engine for any model; they
-are what that one is to be held against, and are not yet measured anew. The page is written by
+**The records of the world are judged by the engine for any model** (30 November 2026, with two or three other programs on
+two processors, so that times are too long); what is named of records that no model is near to has changed since. **All
+other results, from errors in the data on, are of the search for causes that it replaced**: they are what it is to be
+held against, and are not yet measured anew. The page is written by
 
     python -m benchmarks.diagnosis.world_page
 
