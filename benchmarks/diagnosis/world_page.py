@@ -49,7 +49,7 @@ its tolerance. No choice in the program was made with these seeds before they we
 first judged.
 
 **The records of the world are judged by the engine for any model** (30 November 2026, with two or three other programs on
-two processors, so that times are too long); what is named of records that no model is near to has changed since. **All
+two processors, so that times are too long); names of records that no model is near to have changed since. **All
 other results, from errors in the data on, are of the search for causes that it replaced**: they are what it is to be
 held against, and are not yet measured anew. The page is written by
 
