@@ -6,6 +6,7 @@ all spans of time, an unknown input is tried in the one that suits the records b
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -14,6 +15,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from subzero.identification.explanation import (
     CLOCK,
+    CLOCK_KINDS,
     GAIN_SCALE,
     OFFSET_LEVELS,
     Term,
@@ -32,15 +34,15 @@ from subzero.identification.repeats import repeats
 
 SAME_CLOCK = 0.1
 """Odds of a delay of a channel that has the times of the inputs, over those of one with a clock of its own. [-]"""
-CLOCK_KINDS = ("delay", "rate")
 RANKED_BY_RESIDUALS = ("unit", "swapped", "input", "exchanged")
 """Kinds of errors that are worth a look only where the residuals are then smaller."""
-SIZES_TRIED = 8
-"""Errors of a clock up to so many usual ones are tried, in steps of an eighth of one."""
+SIZES_TRIED = 16
+"""Errors of a clock up to so many usual ones are tried, and delays up to half of a record; then some between
+the best one's neighbours."""
 FEWEST_AFTER = 8
 """An error that begins in the middle of a record has so many readings before and after it."""
 SOFT = 3.0
-"""A factor and an offset within so many usual ones are usual. [-]"""
+"""Factors, offsets and errors of a clock within so many usual ones are usual. [-]"""
 ANY_FACTOR = 2e-3
 """Odds that a factor and an offset are those of a regression, which saw the data, over those of any error: their priors
 reach over four decades and a thousand levels, a term's own numbers over a tenth and sixty levels about them. [-]"""
@@ -63,8 +65,8 @@ def declared(problem: Problem) -> list[Term]:
         for term in input_terms(problem.model)
         if (
             problem.differ(term.target, term.partner)
-            if term.partner
-            else term.target in problem.moving_inputs
+            if term.kind == "exchanged"
+            else problem.moving_inputs.issuperset({term.target, term.partner or term.target})
         )
     ]
     data = [
@@ -165,20 +167,39 @@ def _swapped(problem: Problem, linear: Linear, terms: list[Term]) -> Iterator[Te
 
 
 def _from_best_size(problem: Problem, linear: Linear, term: Term) -> Term:
-    """Return an error of a clock that begins at the size which leaves least of the channels that it is about."""
+    """Return an error of a clock that begins at the size which leaves least of the channels that it is about.
+
+    All that are tried are equally probable: the prior of one that is not usual is about it, and has as much of the odds
+    as is within its standard deviation.
+    """
+    entries = problem.entries(with_term(linear.terms, term))
+    (sd,) = [entry.sd for entry in entries if (entry.kind, entry.name) == (term.kind, term.target)]
+    half = 0.5 * max(float(np.ptp(record.time)) for record in problem.records)
+    most = min(SIZES_TRIED * sd, half) if term.kind == "delay" else SIZES_TRIED * sd
+    sizes = np.linspace(-most, most, 8 * SIZES_TRIED + 1)
+    best = sizes[np.argmin(_left_by_sizes(problem, linear, term, sizes))]
+    sizes = best + np.linspace(-1.0, 1.0, 2 * SIZES_TRIED + 1) * (sizes[1] - sizes[0])
+    best = float(sizes[np.argmin(_left_by_sizes(problem, linear, term, sizes))])
+    if abs(best) <= SOFT * sd:
+        return replace(term, size=best / sd)
+    return replace(term, centre=best, odds=term.odds * math.sqrt(2.0 * math.pi) * sd / (2.0 * most))
+
+
+def _left_by_sizes(problem: Problem, linear: Linear, term: Term, sizes: np.ndarray) -> np.ndarray:
+    """Return what errors of a clock of some sizes (n,) leave of the channels that they are about (n,): squares in
+    levels of their sensors.
+    """
     terms = with_term(linear.terms, term)
     entries = problem.entries(terms)
-    (place,) = [i for i, each in enumerate(entries) if (each.kind, each.name) == (term.kind, term.target)]
     known = {entry.identity: value for entry, value in zip(linear.entries, linear.x.tolist(), strict=True)}
     x = np.array([known.get(entry.identity, entry.centre) for entry in entries])
-    sizes = np.linspace(-SIZES_TRIED, SIZES_TRIED, 16 * SIZES_TRIED + 1)
-    sets = [np.where(np.arange(x.size) == place, size * entries[place].sd, x) for size in sizes]
+    own = np.array([(entry.kind, entry.name) == (term.kind, term.target) for entry in entries])
     names = list(problem.channels) if term.target == CLOCK else [term.target]
-    found, _ = problem.residuals(terms, entries, sets, names)
+    found, _ = problem.residuals(terms, entries, [np.where(own, size, x) for size in sizes], names)
     levels, left = problem.levels(terms), np.zeros(sizes.size)
     for name in names:
         left += np.mean((found[name][problem.used(name, terms)] / levels[name]) ** 2, axis=0)
-    return replace(term, size=float(sizes[np.argmin(left)]))
+    return left
 
 
 def _wrapped(values: np.ndarray, turn: float) -> np.ndarray:

@@ -29,6 +29,8 @@ from subzero.identification.model import Cause, Model
 
 CLOCK = "clock"
 """Target of an error of the clock of all channels together."""
+CLOCK_KINDS = ("delay", "rate")
+"""Kinds of such errors, and of those of the times of one channel."""
 AFFINE = "y = a + b x"
 """Of such errors an explanation has only one for each channel."""
 WIDER = 4.0
@@ -135,7 +137,7 @@ class Term:
         kind: cause, unknown, tolerances, offset, scale, affine, unit, drift, delay, rate, swapped, stuck, input,
             exchanged.
         target: the cause, the channel, or the input.
-        partner: the other one of two that are swapped or exchanged.
+        partner: the other one of two that are swapped or exchanged, or have both the other sign.
         odds: prior odds that it holds.
         begins: time from which it holds; −∞ throughout. [s]
         ends: time until which it holds. [s]
@@ -144,6 +146,7 @@ class Term:
         record: in which it holds; −1 in all.
         factor, offset: known values of y = offset + factor x. [-], [unit of the channel]
         size: where a search begins, in standard deviations of its numbers.
+        centre: mean of the prior of its number, where the readings have shown it. [s], or [-] of a rate
     """
 
     id: str
@@ -158,6 +161,7 @@ class Term:
     factor: float = 1.0
     offset: float = 0.0
     size: float = 0.0
+    centre: float = 0.0
     spans: tuple[tuple[float, float], ...] = ()
     intervals: int = 0
 
@@ -200,7 +204,9 @@ def without(terms: Terms, term: Term) -> Terms:
 def _exchanged(term: Term, swap: Term) -> Term:
     """Return a term about the other of two channels whose readings are exchanged."""
     pair = (swap.target, swap.partner)
-    if not swap.partner or not term.is_data_error or term.target not in pair:
+    if swap.kind not in ("swapped", "exchanged") or not term.is_data_error or term.target not in pair:
+        return term
+    if term.partner:  # of two, which have both the same error
         return term
     return term.about(pair[term.target == pair[0]])
 
@@ -347,15 +353,21 @@ def input_terms(model: Model) -> list[Term]:
         for name in inputs
         for factor, words in known
     ]
+    of_two = (
+        ("input", -1.0, "have both the other sign"),
+        ("exchanged", 1.0, "have each other's columns"),
+    )
     return units + [
         Term(
-            f"exchanged:{a}/{b}",
-            f"the inputs {a} and {b} have each other's columns",
-            "exchanged",
+            f"{kind}:{a}/{b}",
+            f"the inputs {a} and {b} {words}",
+            kind,
             a,
             odds / len(pairs),
             partner=b,
+            factor=factor,
         )
+        for kind, factor, words in of_two
         for a, b in pairs
     ]
 
@@ -482,9 +494,10 @@ def _of_sensor(name: str, model: Model, terms: Terms, level: float, delay: float
         "rate": RATE_SCALE,
     }
     spreads = {kind: math.hypot(usual.get(kind, 0.0), wide[kind] * (kind in free)) for kind in wide}
+    centre = {term.kind: term.centre for term in terms if term.target == name and term.kind in CLOCK_KINDS}
     bounds = {"gain": (-0.9, 9.0)}
     return [
-        Entry(kind, name, 0.0, sd, -1, *bounds.get(kind, (-math.inf, math.inf)))
+        Entry(kind, name, centre.get(kind, 0.0), sd, -1, *bounds.get(kind, (-math.inf, math.inf)))
         for kind, sd in spreads.items()
         if sd > 0.0
     ]

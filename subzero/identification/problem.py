@@ -608,7 +608,10 @@ def _column(name: str, terms: Terms) -> str:
 
 def _wrong_inputs(terms: Terms) -> dict[str, tuple[str, float]]:
     """Return input → column that holds it, and by which factor it is too large there."""
-    found = {term.target: (term.target, term.factor) for term in terms if term.kind == "input"}
+    found: dict[str, tuple[str, float]] = {}
+    for term in (term for term in terms if term.kind == "input"):
+        for name in filter(None, (term.target, term.partner)):
+            found[name] = (name, found.get(name, (name, 1.0))[1] * term.factor)
     for a, b in [(term.target, term.partner) for term in terms if term.kind == "exchanged"]:
         found[a], found[b] = (b, found.get(a, (a, 1.0))[1]), (a, found.get(b, (b, 1.0))[1])
     return found

@@ -1,7 +1,8 @@
 """Readings that repeat a value: a sensor that is stuck, or a logger that writes a value where it has no measurement.
 
 Neighbours are equal by chance where a sensor rounds. In n readings of which a share q equal the one before,
-n q^(L−1) runs of L equal ones are expected: longer ones are no chance, if the simulation moves meanwhile.
+n q^(L−1) runs of L equal ones are expected: longer ones are no chance, if the simulation moves meanwhile. Nor is, where
+right readings may be equal for longer, a value that they jump to and back from.
 """
 
 from __future__ import annotations
@@ -41,16 +42,20 @@ def repeats(problem: Problem, name: str, terms: Terms, simulated: np.ndarray, od
     each = problem.readings_of(name, terms)
     for record in np.unique(each.record).tolist():
         at = np.flatnonzero(np.isfinite(each.values) & ~each.spikes & (each.record == record))
-        found = [
-            run for run in runs_of(each.values, at) if not _is_saturated(problem, name, each.values, run)
-        ]
-        if not found or not _moves(problem, name, terms, found, at, simulated):
-            continue
-        spans = [(float(each.time[run.first]), float(each.time[run.last])) for run in found]
-        longest = max(spans, key=lambda span: span[1] - span[0])
-        yield _stuck(name, record, longest, odds / at.size)
-        if len(spans) > 1:
-            yield _lost(name, record, tuple(spans), odds / at.size)
+        usual = problem.prior(name, ())
+        far = FAR * _noise(usual.level, usual.resolution)
+        values = returns_of(each.values, at, far) if usual.resolution else []
+        for found in values or [runs_of(each.values, at)]:
+            runs = [run for run in found if not _is_saturated(problem, name, each.values, run)]
+            if runs and _moves(problem, name, terms, runs, at, simulated):
+                yield from _terms(each.time, name, record, runs, odds / at.size)
+
+
+def _terms(time: np.ndarray, name: str, record: int, runs: list[Run], odds: float) -> Iterator[Term]:
+    spans = [(float(time[run.first]), float(time[run.last])) for run in runs]
+    yield _stuck(name, record, max(spans, key=lambda span: span[1] - span[0]), odds)
+    if len(spans) > 1:
+        yield _lost(name, record, tuple(spans), odds)
 
 
 def runs_of(values: np.ndarray, at: np.ndarray) -> list[Run]:
@@ -66,6 +71,27 @@ def runs_of(values: np.ndarray, at: np.ndarray) -> list[Run]:
                 Run(int(at[i]), int(at[i + n - 1])) for i, n in zip(starts[long], lengths[long], strict=True)
             ]
     return []
+
+
+def returns_of(values: np.ndarray, at: np.ndarray, far: float) -> list[list[Run]]:
+    """Return, for each value to which readings (m,) at some places (n,) jump and from which they jump back, farther
+    than they may by noise, its runs; of values that are read so three times or more.
+    """
+    starts = np.flatnonzero(np.diff(values[at], prepend=np.nan) != 0.0)
+    lengths, own = np.diff(starts, append=at.size), values[at][starts]
+    jumps = np.concatenate([[True], np.abs(np.diff(own)) > far, [own.size > 1]])
+    alone = jumps[:-1] & jumps[1:]
+    each = (np.flatnonzero(alone & (own == value)) for value in np.unique(own[alone]))
+    return [
+        [Run(int(at[starts[i]]), int(at[starts[i] + lengths[i] - 1])) for i in places]
+        for places in each
+        if lengths[places].sum() > 2
+    ]
+
+
+def _noise(level: float, resolution: float) -> float:
+    """Return the standard deviation of a reading, with what rounding adds to it."""
+    return float(np.hypot(level, FAR * resolution / np.sqrt(12.0)))
 
 
 def _is_saturated(problem: Problem, name: str, values: np.ndarray, run: Run) -> bool:
@@ -87,13 +113,10 @@ def _moves(
     lines = [np.interp(run, rest, values[rest]) if rest.size else values[[*run]] for run in runs]
     away = [np.abs(line - values[run.first]).max() for run, line in zip(runs, lines, strict=True)]
     moved = [np.ptp(simulated[run.first : run.last + 1]) for run in runs]
-    rounding = FAR * prior.resolution / np.sqrt(12.0)
+    noise = _noise(prior.level, prior.resolution)
     # A vehicle begins at rest, and sensors have dead bands.
     moved = [size / FAR if run.first == at[0] else size for run, size in zip(runs, moved, strict=True)]
-    return bool(
-        np.linalg.norm(moved) > np.hypot(prior.level, rounding)
-        or max(away) > FAR * np.hypot(prior.level, rounding)
-    )
+    return bool(np.linalg.norm(moved) > noise or max(away) > FAR * noise)
 
 
 def _stuck(name: str, record: int, span: tuple[float, float], odds: float) -> Term:

@@ -21,6 +21,7 @@ from scipy.special import logsumexp
 from subzero.identification.candidates import best_span, declared, suggested
 from subzero.identification.explanation import (
     CLOCK,
+    CLOCK_KINDS,
     Entry,
     Identity,
     Term,
@@ -58,7 +59,8 @@ WORTH, GROSS = 3.0, 100.0
 """A term that is ranked to lose more is not fitted; an error in the data that gains more is a gross one, and a fit that
 is so far below the best one is not brought to its end. [nats]"""
 GROSS_KINDS = ("unit", "affine", "swapped", "input", "exchanged", "stuck")
-"""Errors in the data that may be gross, as those of all channels' clock and those that begin in mid-record may."""
+"""Errors in the data that may be gross, as those of all channels' clock, unusual ones of the times of a channel, and
+those that begin in mid-record may."""
 OF_MODEL = ("number", "start", "unknown")
 """Kinds of entries that every explanation has, and histories: these begin at 0."""
 TWINS = ("offset", "scale", "affine", "delay")
@@ -87,7 +89,7 @@ def ids(terms: Terms) -> tuple[str, ...]:
 def _is_gross_kind(term: Term) -> bool:
     """Return whether an error in the data may be a gross one, which no cause can imitate."""
     begins = term.is_data_error and math.isfinite(term.begins)
-    return term.kind in GROSS_KINDS or term.target == CLOCK or begins
+    return term.kind in GROSS_KINDS or term.target == CLOCK or bool(term.centre) or begins
 
 
 def _changes_with_time(term: Term) -> bool:
@@ -145,8 +147,9 @@ class Search:
         self._offered: set[Key] = set()
         self._sensitivities = Sensitivities(self.problem)
         self._terms, self._unknown = declared(self.problem), unknown_terms(self.problem.model)
-        # Offsets are among them for those that begin in mid-record.
-        self._gross = [term for term in self._terms if term.kind == "offset" or _is_gross_kind(term)]
+        # Offsets are among them for those that begin in mid-record, errors of a channel's times for unusual ones.
+        may_be = ("offset", *CLOCK_KINDS)
+        self._gross = [term for term in self._terms if term.kind in may_be or _is_gross_kind(term)]
         self._loggers = {name: sensor.logger for name, sensor in self.problem.model.channels.items()}
 
     def score(self, fitted: Fit) -> float:
@@ -411,6 +414,7 @@ class Search:
                     factor=1.0 / term.factor,
                     offset=-term.offset / term.factor,
                     size=-term.size,
+                    centre=-term.centre,
                 )
 
     def _fit(self, start: Linear, expected: float = -np.inf, *, again: bool = False) -> Fit:
@@ -520,14 +524,15 @@ class Search:
         """Return where the search for the numbers of a new term begins, if that is not at their nominal values; of
         numbers that no term has had (not known), or that it changes.
         """
-        if not (new and new.size):
+        if not (new and (new.size or new.centre)):
             return {}
         causes = {cause.id: cause for cause in self.problem.model.causes}
         changes = causes[new.target].changes if new.kind == "cause" else {}
         return {
             entry.identity: float(np.clip(entry.centre + new.size * entry.sd, entry.low, entry.high))
             for entry in entries
-            if (entry.kind in ("cause", "delay", "rate") and entry.identity not in known)
+            if (entry.kind == "cause" and entry.identity not in known)
+            or (entry.kind in CLOCK_KINDS and (entry.kind, entry.name) == (new.kind, new.target))
             or (entry.kind == "number" and entry.name in changes)
         }
 

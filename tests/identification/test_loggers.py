@@ -2,7 +2,7 @@
 
 Verifies: both are named, alone and beside a cause; a swap also where the noise of the channels is not declared and one
 of them is in another unit as well; a clock of all channels that is fast against the inputs, to 3 standard deviations;
-inputs with the other sign, in another unit, or in each other's columns.
+inputs with the other sign, one or two of them, in another unit, or in each other's columns.
 Columns that are in their places and clocks that run right are not named.
 Truth is exact: a heated rod, its middle and its end are first-order lags, one behind the other, and a fast clock reads
 the exact solution at other times.
@@ -116,6 +116,39 @@ def test_an_input_with_the_other_sign_or_in_another_unit(name, factor, noise):
     verdict = sd.diagnose(sd.Record(given.time, columns), model(noise=noise))
     assert [each.id for each in verdict.named] == [f"input:{name}"]
     assert verdict.named[0].estimates[0].value == pytest.approx(factor)
+
+
+def planes(p, u, t):
+    """Return the exact solution of x' = s + s²/5 − x for the sum and the difference s of two inputs that are held."""
+    keep, shown = np.exp(-(t[1] - t[0])), {"pitch": [], "roll": []}
+    sides = {
+        "pitch": p["gain"] * (u["port"] + u["starboard"]),
+        "roll": p["gain"] * (u["port"] - u["starboard"]),
+    }
+    for name, values in shown.items():
+        x = 0.0
+        for s in sides[name]:
+            values.append(x)
+            x = (s + 0.2 * s**2) + (x - (s + 0.2 * s**2)) * keep
+    return {name: np.array(values) for name, values in shown.items()}
+
+
+def test_two_inputs_with_the_other_sign_of_which_one_alone_brings_nothing_nearer():
+    rng = np.random.default_rng(8)
+    port, starboard = (np.repeat(rng.choice([-1.0, 0.0, 1.5], 10), 20) for _ in range(2))
+    time = STEP * np.arange(200)
+    shown = planes({"gain": 1.0}, {"port": port, "starboard": starboard}, time)
+    columns = {name: values + 0.02 * rng.standard_normal(200) for name, values in shown.items()}
+    made = sd.Model(
+        planes,
+        channels={name: sd.Sensor(noise=0.02) for name in columns},
+        inputs=["port", "starboard"],
+        parameters=[sd.Number("gain", 1.0, tolerance=0.05)],
+        causes=[sd.Cause("gain", "the gain is another", changes={"gain": 0.3})],
+    )
+    verdict = sd.diagnose(sd.Record(time, {**columns, "port": -port, "starboard": -starboard}), made)
+    assert [each.id for each in verdict.named] == ["input:port/starboard"]
+    assert verdict.named[0].sentence == "the inputs port and starboard have both the other sign"
 
 
 def test_inputs_in_each_others_columns_beside_a_cause():

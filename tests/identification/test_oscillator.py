@@ -122,6 +122,17 @@ def test_a_clock_that_is_late_against_the_inputs_is_found_with_its_delay():
     assert estimate(verdict, "delay").value == pytest.approx(late, abs=0.02)
 
 
+@pytest.mark.parametrize("late", [9.0, -6.0])
+def test_a_clock_that_is_late_by_far_more_than_usual_is_found(late):
+    seen = record(3)
+    when = seen.time - late
+    x = np.interp(when, seen.time, seen.columns["x"])
+    x[(when < 0.0) | (when > seen.time[-1])] = np.nan
+    verdict = sd.diagnose(changed(seen, x=x), model(unknown=False))
+    assert [each.id for each in verdict.named] == ["delay:x"]
+    assert estimate(verdict, "delay").value == pytest.approx(late, abs=0.02)
+
+
 @pytest.mark.long
 def test_a_command_that_may_be_off_may_as_well_be_what_is_late():
     """With one channel and one clock, a late drive and a late sensor give the same readings."""

@@ -1,8 +1,8 @@
 """Readings that repeat a value: a stuck sensor, or a logger that writes a value where it has no measurement.
 
 Verifies: values that are held, zeros, and −999 here and there are named as one error, and what they hide is found
-beside them; a short run of readings that are not rounded is enough; a sensor that rounds, one that stands still, and
-one that is slower than its logger have no error.
+beside them, also where right readings are equal for longer; a short run of readings that are not rounded is enough; a
+sensor that rounds, one that stands still, and one that is slower than its logger have no error.
 Truth is exact: a first-order lag. Tolerance: 3 standard deviations of the verdict.
 """
 
@@ -60,6 +60,16 @@ def test_a_value_in_place_of_measurements_is_named_beside_a_cause(gain, value):
     assert {each.id for each in verdict.named} == {"lost:x@0", *(["gain"] if gain > 1.0 else [])}
     sizes = {e.name: e for each in verdict.named for e in each.estimates}
     assert all(abs(e.value - gain) < 3.0 * e.sd for e in sizes.values())
+
+
+def test_a_value_in_place_of_measurements_is_named_where_right_readings_are_equal_for_longer():
+    made = record(resolution=0.5, rest=80, seed=1)
+    x = made.columns["x"].copy()
+    for begin in (20, 50):
+        x[begin : begin + 12] = 5.0
+    (named,) = sd.diagnose(sd.Record(made.time, {**made.columns, "x": x}), model()).named
+    assert named.id == "lost:x@0"
+    assert "2 times from 2 to 6.1 s" in named.sentence
 
 
 def test_a_sensor_that_is_stuck_for_a_short_time_is_named():

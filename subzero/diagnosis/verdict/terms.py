@@ -176,9 +176,18 @@ def _step(fit: Fit, term: Term) -> DataError:
 
 
 def _command(fit: Fit, term: Term) -> DataError:
-    if term.factor == -1.0 and term.target in GROUPS:
-        return DataError(kind="command_sign", channels=(GROUPS[term.target],))
-    return DataError(kind="command_unit", channels=(term.target,), scale=term.factor)
+    columns = tuple(filter(None, (term.target, term.partner)))
+    if term.factor == -1.0 and (groups := _groups_of(columns)):
+        return DataError(kind="command_sign", channels=groups)
+    return DataError(kind="command_unit", channels=columns, scale=term.factor)
+
+
+def _groups_of(columns: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the groups of commands that some columns are; none if one of them is in no group."""
+    for group, own in COMMAND_GROUPS.items():
+        if set(own) == set(columns):
+            return (group,)
+    return tuple(GROUPS[name] for name in columns) if GROUPS.keys() >= set(columns) else ()
 
 
 def _commands(fit: Fit, term: Term) -> DataError:
