@@ -76,8 +76,8 @@ def _reach(
 
     Arrays cannot grow in here: stop before they are full, so that Python can enlarge them and call again.
     """
-    nodes = live.line.ends.count + 1 + SPARE * parts
-    if nodes > live.line.length.size or used + live.line.length.size > recording.tension.size:
+    nodes, space = live.line.ends.count + 1 + SPARE * parts, live.line.length.size
+    if setup.fixed.tethered and (nodes > space or used + space > recording.tension.size):
         return NO_SPACE
     span = (times[at] - times[at - 1]) / parts
     for part in range(parts):
