@@ -272,10 +272,10 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
     def _observed(self, errors: list[float], seen: np.ndarray) -> np.ndarray:
         """Return the observations of the agents, within the limits of their space (num_envs, 6)."""
         space: Any = self.observation_space
-        felt = np.empty(space.shape, dtype=np.float32)
+        felt: np.ndarray = np.empty(space.shape, dtype=np.float32)
         felt[:, :2] = [(sin(error), cos(error)) for error in errors]
         felt[:, 2:] = seen[:, FELT]
-        return np.minimum(np.maximum(felt, space.low), space.high)
+        return felt.clip(space.low, space.high)
 
     def _infos(self, wanted: np.ndarray, seen: np.ndarray) -> dict[str, Any]:
         """Return the truth of all by name, (num_envs,) each; and by the name with _ before it, that each has it."""

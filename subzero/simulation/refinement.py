@@ -310,13 +310,13 @@ def _side_by_side(
     """
     ended, (trial, whole) = Event(), asked
     short = _only_traced(whole.times[: START_ROWS + 1], START_REFINEMENTS[0])
-    jobs = coarser, (resolved(trial, 1.0 / START_REFINEMENTS[0]), short)
 
     def go_on(_: float) -> None:
         if ended.is_set():
             raise CancelledError
 
     def others() -> list[Run | None]:
+        jobs = coarser, (resolved(trial, 1.0 / START_REFINEMENTS[0]), short)
         return [None if each is None else _taken(take, each, grid, go_on) for each, grid in jobs]
 
     def take_or_have(each: scenarios.Trial, grid: Grid, reported: Progress | None) -> Run:

@@ -62,7 +62,7 @@ class SteppingGroup:
             self._asked.put(self._batch)
         self._finish()
         goals, endings = self._reached.T
-        for i in np.flatnonzero(endings == NO_SPACE):
+        for i in np.flatnonzero(endings == NO_SPACE).tolist():
             each = self._simulators[i]
             each._reach(int(goals[i]), *self._orders[i].tolist())
             endings[i], self._shown[i] = each._held.at[ENDING], each.seen
@@ -72,8 +72,9 @@ class SteppingGroup:
         """Take the runs as they are now: after a reset, or with space for more rows, they are other arrays."""
         if self._held and all(map(is_, held, self._held)):
             return
-        parts = zip(*((each.handle, each.at, each.seen) for each in held), strict=True)
-        self._held, self._batch = held, hold_batch(*parts, self._orders, self._shown, self._reached)
+        handles, at, seen = zip(*((each.handle, each.at, each.seen) for each in held), strict=True)
+        batch = hold_batch(handles, at, seen, self._orders, self._shown, self._reached)
+        self._held, self._batch = held, batch
 
     def _finish(self) -> None:
         """Take what no other thread has taken, and wait for what the others have."""
