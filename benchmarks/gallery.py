@@ -83,7 +83,7 @@ GALLERY = (
 EXAMPLES = (
     "fig6", "own_trial", "own_cable", "measured_record", "sweep", "cable_pulled_out", "static_shape", "winch",
     "vehicle_alone", "own_controller", "autopilot", "gymnasium_environment", "diagnose", "calibrate",
-    "glider", "tether_buoy", "tether_snap", "tether_fmu", "ardupilot_rov",
+    "glider", "tether_buoy", "tether_snap", "tether_fmu", "ardupilot_rov", "tether_mujoco",
 )  # fmt: skip
 """The scripts of ``examples/``, in the order of the page."""
 

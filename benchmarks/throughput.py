@@ -24,6 +24,8 @@ import numpy as np
 
 import subzero
 from benchmarks.peers import numpy_hull
+from benchmarks.tether import counting_gain
+from subzero.simulation.stepping_group import SteppingGroup
 
 SEGMENTS = (0, 25, 50, 100, 200)
 PAID_OUT = 28
@@ -127,34 +129,61 @@ def plain(repeats):
     yield "NumPy", f"{1e3 * slow:.1f}", "1", ""
 
 
-def learning(repeats):
-    """Yield rows: steps a second of the Gymnasium environment."""
+def median_rate(begin, go, steps, repeats):
+    """Return the median of steps a second, by the clock, of calls behind one that is not counted."""
+    rates = []
+    for _ in range(repeats + 1):
+        begin()
+        started = time.perf_counter()
+        go()
+        rates.append(steps / (time.perf_counter() - started))
+    return statistics.median(rates[1:])
+
+
+def environments(sample_time, count, repeats, mode=None, **how):
+    """Return steps a second of environments that Gymnasium makes."""
     import gymnasium
 
     import subzero.gym_environment as ours
 
-    def many(sample_time, count, mode, **how):
-        made = gymnasium.make_vec(
-            ours.ENVIRONMENT, num_envs=ENVIRONMENTS, vectorization_mode=mode, sample_time=sample_time, **how
-        )
-        made.reset(seed=1)
-        actions = np.zeros((ENVIRONMENTS, 1), dtype=np.float32)
+    made = gymnasium.make_vec(
+        ours.ENVIRONMENT, num_envs=ENVIRONMENTS, vectorization_mode=mode, sample_time=sample_time, **how
+    )
+    actions = np.zeros((ENVIRONMENTS, 1), dtype=np.float32)
 
-        def go():
-            for _ in range(count):
-                made.step(actions)
+    def go():
+        for _ in range(count):
+            made.step(actions)
 
-        rate = ENVIRONMENTS * count / median(go, repeats, time.perf_counter)
-        made.close()
-        return rate
+    rate = median_rate(lambda: made.reset(seed=1), go, ENVIRONMENTS * count, repeats)
+    made.close()
+    return rate
 
+
+def batch_loop(sample_time, count, repeats, threads):
+    """Return steps a second of the same simulators in one compiled call of each thread: no Python between steps."""
+    simulators = [subzero.Simulator("fig6", sample_time=count * sample_time) for _ in range(ENVIRONMENTS)]
+    group, orders = SteppingGroup(simulators, threads), np.tile([25.0, 0.0, 0.0, 0.0], (ENVIRONMENTS, 1))
+
+    def begin():
+        for each in simulators:
+            each.reset()
+
+    rate = median_rate(begin, lambda: group.hold(orders), ENVIRONMENTS * count, repeats)
+    group.close()
+    return rate
+
+
+def learning(repeats):
+    """Yield rows: steps a second of the Gymnasium environment."""
     threads = os.cpu_count()
     for sample_time, count in ENVIRONMENT_STEPS.items():
-        sync = many(sample_time, count, "sync")
+        sync = environments(sample_time, count, repeats, "sync")
         for name, rate in (
             ("`sync`, Gymnasium's own", sync),
-            ("`workers=1`", many(sample_time, count, None, workers=1)),
-            (f"`workers={threads}`", many(sample_time, count, None, workers=threads)),
+            ("`workers=1`", environments(sample_time, count, repeats, workers=1)),
+            (f"`workers={threads}`", environments(sample_time, count, repeats, workers=threads)),
+            (f"no environment, {threads} threads", batch_loop(sample_time, count, repeats, threads)),
         ):
             yield f"{sample_time:g}", name, f"{rate:,.0f}", f"{rate / sync:.2f}"
 
@@ -171,7 +200,7 @@ def main():
         of_runs(asked.repeats, cores)
     head = ("sample time [s]", "`gymnasium.make_vec`", "steps a second", "ratio")
     table(f"{ENVIRONMENTS} environments that learn", head, learning(asked.repeats))
-    print(f"\nload {os.getloadavg()[0]:.1f} when it ended")
+    print(f"\nload {os.getloadavg()[0]:.1f} when it ended; two threads count {counting_gain():.2f} times one")
 
 
 def of_runs(repeats, cores):

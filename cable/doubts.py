@@ -55,6 +55,8 @@ def slack_share(length: np.ndarray, chord: np.ndarray, tension: np.ndarray) -> n
     """
     length = np.maximum(length, 1e-9)
     folded = 1.0 - chord.sum(axis=1) / length
+    if not (folded > FOLDED).any():
+        return np.zeros(length.shape)
     limp = (tension[:, 1:] < LIMP) & (tension[:, :-1] < LIMP)
     share = np.where(limp, chord, 0.0).sum(axis=1) / length + folded
     return np.where(folded > FOLDED, np.clip(share, 0.0, 1.0), 0.0)

@@ -148,7 +148,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
     def hold(self, share: float) -> bool:
         """Hold the rudder at a share of its limit for one sample time; return whether the simulation stopped."""
         try:
-            self._sim.hold(*self.order(share))
+            self._sim.hold(*self.order(np.array([share]))[0].tolist())
             stopped = False
         except RunStoppedError:
             stopped = True
@@ -159,9 +159,11 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         """Count a step of the episode."""
         self._taken += 1
 
-    def order(self, share: float) -> tuple[float, float, float, float]:
-        """Return the command with the rudder at a share of its limit: propeller [rev/s], three fins [rad]."""
-        return self._propeller, self._most * share + 0.0, 0.0, 0.0  # + 0.0: no negative zero
+    def order(self, shares: np.ndarray) -> np.ndarray:
+        """Return commands with the rudder at shares of its limit (n,): propeller [rev/s], three fins [rad] (n, 4)."""
+        orders = np.zeros((shares.size, 4))
+        orders[:, 0], orders[:, 1] = self._propeller, self._most * shares + 0.0  # no negative zero
+        return orders
 
     def reward(self, error: float, share: float) -> float:
         """Return the reward of a sample time: heading error at its end [rad], rudder as a share of its limit."""
@@ -183,9 +185,9 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._sim.observation
 
     @property
-    def truth(self) -> tuple[np.ndarray, float]:
-        """The true values of `Observation`, which the next step writes over, and the wanted heading [rad]."""
-        return self._sim.seen, self._wanted
+    def wanted(self) -> float:
+        """The heading to turn to. [rad]"""
+        return self._wanted
 
     @property
     def _error(self) -> float:
@@ -243,10 +245,9 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold each rudder for one sample time, (num_envs, 1); return the same in arrays as each environment does."""
         rudders = _shares(actions, self.num_envs)
-        ended = np.array(
-            self._held_one_by_one(rudders) if self._autoreset_envs.any() else self._held(rudders)
-        )
-        seen, wanted = (np.array(each) for each in zip(*(our.truth for our in self._ours), strict=True))
+        held = self._held_one_by_one if self._autoreset_envs.any() else self._held
+        ended, seen = held(rudders)
+        wanted = np.array([our.wanted for our in self._ours])
         errors = (wanted - seen[:, HEADING]).tolist()
         rewards = np.array(list(map(self._ours[0].reward, errors, rudders)))
         rewards[self._autoreset_envs] = 0.0
@@ -254,27 +255,27 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         self._autoreset_envs = ended | cut
         return self._observed(errors, seen), rewards, ended, cut, self._infos(wanted, seen)
 
-    def _held(self, rudders: list[float]) -> list[bool]:
-        """Step all environments, side by side; return which simulations stopped."""
-        orders = np.array([our.order(share) for our, share in zip(self._ours, rudders, strict=True)])
+    def _held(self, rudders: list[float]) -> tuple[np.ndarray, np.ndarray]:
+        """Step all environments, side by side; return which simulations stopped, and the true values."""
         for our in self._ours:
             our.count()
-        return self._group.hold(orders)
+        return self._group.hold(self._ours[0].order(np.array(rudders)))
 
-    def _held_one_by_one(self, rudders: list[float]) -> list[bool]:
-        """Step the environments, and start those again whose episode is over; return which simulations stopped."""
+    def _held_one_by_one(self, rudders: list[float]) -> tuple[np.ndarray, np.ndarray]:
+        """Step the environments, and start those again whose episode is over; return the same."""
         for i in np.flatnonzero(self._autoreset_envs):
             self._ours[i].reset()
-        return [
-            not again and our.hold(share)
-            for our, share, again in zip(self._ours, rudders, self._autoreset_envs.tolist(), strict=True)
-        ]
+        each = zip(self._ours, rudders, self._autoreset_envs.tolist(), strict=True)
+        stopped = [not again and our.hold(share) for our, share, again in each]
+        return np.array(stopped), np.array([our.simulator.seen for our in self._ours])
 
     def _observed(self, errors: list[float], seen: np.ndarray) -> np.ndarray:
         """Return the observations of the agents, within the limits of their space (num_envs, 6)."""
         space: Any = self.observation_space
-        turned = [(sin(error), cos(error)) for error in errors]
-        return np.clip(np.hstack([turned, seen[:, FELT]], dtype=np.float32), space.low, space.high)
+        felt: np.ndarray = np.empty(space.shape, dtype=np.float32)
+        felt[:, :2] = [(sin(error), cos(error)) for error in errors]
+        felt[:, 2:] = seen[:, FELT]
+        return felt.clip(space.low, space.high)
 
     def _infos(self, wanted: np.ndarray, seen: np.ndarray) -> dict[str, Any]:
         """Return the truth of all by name, (num_envs,) each; and by the name with _ before it, that each has it."""

@@ -76,8 +76,8 @@ def _reach(
 
     Arrays cannot grow in here: stop before they are full, so that Python can enlarge them and call again.
     """
-    nodes = live.line.ends.count + 1 + SPARE * parts
-    if nodes > live.line.length.size or used + live.line.length.size > recording.tension.size:
+    nodes, space = live.line.ends.count + 1 + SPARE * parts, live.line.length.size
+    if setup.fixed.tethered and (nodes > space or used + space > recording.tension.size):
         return NO_SPACE
     span = (times[at] - times[at - 1]) / parts
     for part in range(parts):
@@ -123,6 +123,8 @@ class _InterpretedBatch(NamedTuple):
     at: tuple[np.ndarray, ...]
     seen: tuple[np.ndarray, ...]
     orders: np.ndarray
+    shown: np.ndarray
+    reached: np.ndarray
     taken: np.ndarray
     done: np.ndarray
 
@@ -156,7 +158,9 @@ def make_handle(setup: Setup, live: Live, recording: Recording, times: np.ndarra
     return Handle(setup, live, recording, times)
 
 
-def hold_batch(handles: Any, at: Any, seen: Any, orders: np.ndarray) -> Any:
+def hold_batch(
+    handles: Any, at: Any, seen: Any, orders: np.ndarray, shown: np.ndarray, reached: np.ndarray
+) -> Any:
     """Return a handle of some runs at once, which any number of threads advance together: `begin`, `share`.
 
     Args:
@@ -164,17 +168,27 @@ def hold_batch(handles: Any, at: Any, seen: Any, orders: np.ndarray) -> Any:
         at: where each stands, a tuple of arrays; changed, with its ending.
         seen: what each fills, a tuple of arrays.
         orders: command of each (runs, 4), in the units of `advance`.
+        shown: filled with `seen` of all (runs, entries).
+        reached: filled with the row that each was to reach, and how that ended (runs, 2).
     """
+    counts = np.full(1, len(handles)), np.full(1, len(handles))
     with deferred_signals():
-        return make_batch(handles, at, seen, orders, np.full(1, len(handles)), np.full(1, len(handles)))
+        return make_batch(handles, at, seen, orders, shown, reached, *counts)
 
 
 @allocating
 def make_batch(
-    handles: Any, at: Any, seen: Any, orders: np.ndarray, taken: np.ndarray, done: np.ndarray
+    handles: Any,
+    at: Any,
+    seen: Any,
+    orders: np.ndarray,
+    shown: np.ndarray,
+    reached: np.ndarray,
+    taken: np.ndarray,
+    done: np.ndarray,
 ) -> Any:
     """Return a handle of some runs, of which so many are taken and done; `hold_batch` makes it safely."""
-    return Batch(handles, at, seen, orders, taken, done)
+    return Batch(handles, at, seen, orders, shown, reached, taken, done)
 
 
 @allocating
@@ -224,28 +238,44 @@ def begin(batch: Any) -> None:
 
 
 LOOKS = 20_000
-"""So often `share` looks, for some ten microseconds, whether other threads are done with what they have taken."""
+"""So often `share` looks for what other threads have done: for some 0.1 ms, about as long as a thread takes to wake."""
 
 
 @allocating
-def share(batch: Any, count: int) -> bool:
+def share(batch: Any, count: int, stays: bool) -> bool:
     """Take so many exchanges of each run of a batch that no thread has taken yet, one after another.
 
-    A thread that is late has less to do, or nothing; the lock of Python is let go of once.
+    A thread that is late has less to do, or nothing; the lock of Python is let go of once. One that `stays` looks for
+    the next `begin` for a while, the others for the end of this one.
 
     Returns:
         whether all runs are done; another thread may still be busy with one.
     """
+    runs, looks = len(batch.handles), 0
+    _take(batch, count)
+    while looks < LOOKS and (stays or add(batch.done, 0) < runs):
+        looks += 1
+        if stays and add(batch.taken, 0) < runs:
+            _take(batch, count)
+            looks = 0
+    return bool(add(batch.done, 0) == runs)
+
+
+@allocating
+def _take(batch: Any, count: int) -> None:
+    """Advance runs that no thread has taken, as long as there are any; one without rows for that has `NO_SPACE`."""
     orders, i = batch.orders, add(batch.taken, 1)
     while i < len(batch.handles):
+        handle, at, goal = batch.handles[i], batch.at[i], batch.at[i][ROW] + count
         n, rudder, port, starboard = orders[i, 0], orders[i, 1], orders[i, 2], orders[i, 3]
-        advance(batch.handles[i], batch.at[i], count, n, rudder, port, starboard, batch.seen[i])
+        if goal < handle.times.size:
+            advance(handle, at, count, n, rudder, port, starboard, batch.seen[i])
+        else:
+            at[ENDING] = NO_SPACE
+        batch.reached[i, 0], batch.reached[i, 1] = goal, at[ENDING]
+        batch.shown[i] = batch.seen[i]
         add(batch.done, 1)
         i = add(batch.taken, 1)
-    looks = 0
-    while looks < LOOKS and add(batch.done, 0) < len(batch.handles):
-        looks += 1
-    return bool(add(batch.done, 0) == len(batch.handles))
 
 
 @allocating

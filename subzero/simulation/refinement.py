@@ -16,7 +16,8 @@ ill-posed drum may be the same on segments of one and of half a metre. So every 
 finer ones can settle (`subzero.validity.refinement_that_settles`) is compared with runs two, four and, where it must
 be, eight times as fine, of which the first that contradicts is the last (`prove`). What they change is its error.
 
-The coarse run is made in a second thread while the first makes the run itself: compiled code lets go of Python's lock.
+The coarse run, and that of the start, are made in a second thread while the first makes the run itself: compiled code
+lets go of Python's lock.
 
 All of these runs share one `Budget`: `[run] budget_s`, or else ten times the work of the run as it was asked for, at
 least two seconds of it. It is counted in nodes times iterations, not by a clock, so that the same trial gives the same
@@ -210,7 +211,7 @@ def run_converged(
     # The coarse run is there for its force alone, so its energies and shapes are not kept.
     coarse_grid = _only_traced(coarse_times, 1)
     if side_by_side:
-        run, coarse = _side_by_side(take, (trial, whole), (coarser, coarse_grid), progress)
+        run, coarse, take = _side_by_side(take, (trial, whole), (coarser, coarse_grid), progress)
     else:
         run = take(trial, whole, _share(progress, 0.0, 0.7))
         coarse = _taken(take, coarser, coarse_grid, _share(progress, 0.7, 0.3))
@@ -301,19 +302,31 @@ def _side_by_side(
     asked: tuple[scenarios.Trial, Grid],
     coarser: tuple[scenarios.Trial, Grid],
     progress: Progress | None,
-) -> tuple[Run, Run | None]:
-    """Return the run that was asked for, and a coarser one that is made in a second thread in the meantime.
+) -> tuple[Run, Run | None, Take]:
+    """Return the run that was asked for, a coarser one that is made in a second thread in the meantime, and a `take`
+    that has the first run of the start (`_start`), which is made there, too.
 
     An error or an interrupt of the one ends the other one soon, and is raised after that.
     """
-    ended = Event()
+    ended, (trial, whole) = Event(), asked
+    short = _only_traced(whole.times[: START_ROWS + 1], START_REFINEMENTS[0])
 
     def go_on(_: float) -> None:
         if ended.is_set():
             raise CancelledError
 
+    def others() -> list[Run | None]:
+        jobs = coarser, (resolved(trial, 1.0 / START_REFINEMENTS[0]), short)
+        return [None if each is None else _taken(take, each, grid, go_on) for each, grid in jobs]
+
+    def take_or_have(each: scenarios.Trial, grid: Grid, reported: Progress | None) -> Run:
+        is_it = not grid.booked and (grid.parts, grid.times.size) == (short.parts, short.times.size)
+        if is_it and start is not None and start.recording.iterations[-1] <= grid.iterations:
+            return start
+        return take(each, grid, reported)
+
     with ThreadPoolExecutor(1) as second:
-        started = cache(lambda: second.submit(_taken, take, *coarser, go_on))
+        started = cache(lambda: second.submit(others))
 
         def reported(fraction: float) -> None:
             started()  # not before: the first thread compiles, as no signal breaks in on that
@@ -321,7 +334,9 @@ def _side_by_side(
                 progress(fraction)
 
         try:
-            return take(*asked, reported), started().result()
+            run = take(*asked, reported)
+            coarse, start = started().result()
+            return run, coarse, take_or_have
         finally:
             ended.set()
 

@@ -41,7 +41,7 @@ from subzero.engine.run_state import Live, Orders, Setup
 from subzero.engine.time_loop import ENDING, NO_SPACE, ROW, USED, advance, hold, observe
 from subzero.errors import UserError, real, short, suggestion
 from subzero.model import Model, load, model_of
-from subzero.simulation.run import WENT_WELL, enlarged_run, in_words
+from subzero.simulation.run import SPARE_SEGMENTS, WENT_WELL, enlarged_run, in_words
 from vehicle.channels import FIRST_COMMAND
 
 if TYPE_CHECKING:
@@ -138,12 +138,12 @@ class Simulator:
 
     def reset(self) -> Observation:
         """Return to the start; return the observation there."""
-        setup, live = prepare(self.trial, self.model, self._tethered)
+        setup, live = prepare(self.trial, self.model, self._tethered, spare=SPARE_SEGMENTS)
         self._orders = setup.orders
         setup = setup._replace(orders=Orders(np.zeros(1), np.zeros((1, setup.orders.values.shape[1]))))
         setup.orders.values[0] = self._command_at(0.0)
         times = _times(self.trial)
-        nodes = 4 * times.size * live.line.length.size if self._tethered else 0
+        nodes = times.size * live.line.length.size if self._tethered else 0
         recording = new_recording(times.size, nodes, entries=live.state.size)
         used = record_row(setup, live, recording, 0, 0.0, 0)
         at, seen = np.array([0, used, coupling.FINE]), np.zeros(len(Observation._fields))
@@ -195,18 +195,13 @@ class Simulator:
             RunStoppedError: the simulation cannot go on.
         """
         self._check_on()
-        self._reach(self._goal(), n, rudder, port, starboard)
+        self._reach(int(self._held.at[ROW]) + self._exchanges, n, rudder, port, starboard)
         self._check_on()
-
-    def _goal(self) -> int:
-        """Return the row that a sample time ends with; there is space for it."""
-        goal = int(self._held.at[ROW]) + self._exchanges
-        if goal >= self._held.times.size:
-            self._held = _with_rows(self._held, goal)
-        return goal
 
     def _reach(self, goal: int, n: float, rudder: float, port: float, starboard: float) -> None:
         """Go on to a row, or until that is not possible; enlarge the arrays where they are full."""
+        if goal >= self._held.times.size:
+            self._held = _with_rows(self._held, goal)
         while True:
             held = self._held
             count = goal - int(held.at[ROW])

@@ -404,8 +404,8 @@ def _finer(trial: scenarios.Trial) -> str:
 
 def _chords(P: np.ndarray) -> np.ndarray:
     """Return the distances between neighbouring nodes, 0 after the last (samples, nodes − 1). [m]."""
-    x, y, z = np.moveaxis(np.diff(P, axis=1), 2, 0)
-    lengths: np.ndarray = np.sqrt(x * x + y * y + z * z)
+    squares = (P[:, 1:] - P[:, :-1]) ** 2
+    lengths: np.ndarray = np.sqrt(squares[..., 0] + squares[..., 1] + squares[..., 2])
     # Rows are padded with NaN after the last node.
     lengths[np.isnan(lengths)] = 0.0
     return lengths

@@ -7,6 +7,7 @@ import runpy
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import cable
@@ -19,7 +20,7 @@ NAMES = sorted(path.stem for path in FOLDER.glob("*.py"))
 SLOW = ("calibrate", "diagnose")
 PUBLIC = {"subzero": subzero.__all__, "cable": cable.__all__, "vehicle": vehicle.__all__}
 PUBLIC |= {"subzero.fmu": ["export_fmu"], "subzero.ardupilot": ["TetheredRov"]}
-OTHERS = {"matplotlib.pyplot", "numpy", "gymnasium", "math", "pathlib", "json", "fmpy"}
+OTHERS = {"matplotlib.pyplot", "numpy", "gymnasium", "math", "pathlib", "json", "fmpy", "mujoco"}
 PNG = b"\x89PNG\r\n"
 
 
@@ -50,7 +51,21 @@ def test_an_example_leaves_its_picture(name, picture):
     if name == "tether_fmu":
         pytest.importorskip("pythonfmu", reason="the extra [fmu] is not installed")
         pytest.importorskip("fmpy", reason="FMPy, which steps the unit, is not installed")
+    if name == "tether_mujoco":
+        pytest.importorskip("mujoco", reason="MuJoCo, the host, is not installed")
     assert picture(name).read_bytes().startswith(PNG)
+
+
+@pytest.mark.long
+@pytest.mark.usefixtures("picture")
+def test_a_drone_of_mujoco_carries_its_tether():
+    """At rest at the end: its thrust carries both, to 1 %; the winch pulls as it was asked to, with 1 N."""
+    pytest.importorskip("mujoco", reason="MuJoCo, the host, is not installed")
+    end = runpy.run_path(str(FOLDER / "tether_mujoco.py"))
+    pull, held = end["tether"].forces
+    assert end["thrust"][2] - end["MASS"] * end["GRAVITY"] == pytest.approx(pull[2], rel=1e-2)
+    assert pull[2] + held[2] == pytest.approx(end["line"].weight_in_water * end["tether"].length, rel=2e-2)
+    assert np.linalg.norm(held) == pytest.approx(1.0, rel=1e-2)
 
 
 @pytest.mark.slow

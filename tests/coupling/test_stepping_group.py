@@ -41,10 +41,12 @@ def test_threads_give_the_numbers_of_one_after_another(threads):
     for k, turns in enumerate(TURNS):
         if k == 20:
             alone[2].reset(), together[2].reset()
-        assert group.hold(orders(turns)) == [False] * COUNT
+        stopped, shown = group.hold(orders(turns))
+        assert not stopped.any()
         for each, order in zip(alone, orders(turns).tolist(), strict=True):
             each.hold(*order)
         np.testing.assert_array_equal(seen(together), seen(alone))
+        np.testing.assert_array_equal(shown, seen(alone))
     group.close()
 
 
