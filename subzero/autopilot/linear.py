@@ -263,10 +263,6 @@ def _spread(row: np.ndarray) -> np.ndarray:
     return row / float(row @ row)
 
 
-if TYPE_CHECKING:
-    import control
-
-
 class Mode(NamedTuple):
     """One pole, or a pair.
 

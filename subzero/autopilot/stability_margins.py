@@ -84,9 +84,6 @@ def margins(loop: control.StateSpace, *, delay: float = 0.0) -> Margins:
     )
 
 
-if TYPE_CHECKING:
-    import control
-
 MARGINAL = 1e-6
 """A motion that grows by less than this per sample counts as constant, as the depth in the pitch loop does."""
 
