@@ -141,7 +141,15 @@ def pull_out(
     """
     row, options = _chosen(scheme)
     task = PullOut.of(
-        tow_velocity, duration, cable=cable, drum=drum, current=current, start=start, bed=bed, clamps=clamps
+        tow_velocity,
+        duration,
+        cable=cable,
+        drum=drum,
+        current=current,
+        start=start,
+        bed=bed,
+        clamps=clamps,
+        surface=surface,
     )
     _refuse_unknown(task, row, options)
     return row.pull_out(task, options)
