@@ -9,15 +9,15 @@ depth rate must be asked for.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from math import asin, cos, pi, sin, tan
+from dataclasses import replace
+from functools import cached_property
+from math import asin, pi, sin, tan
 
 import numpy as np
 
 from subzero.steady_motion.asked import Asked
 from subzero.steady_motion.hull_state_space import (
     CHANNELS,
-    DEPTH,
     PITCH,
     ROLL,
     VELOCITY,
@@ -25,8 +25,8 @@ from subzero.steady_motion.hull_state_space import (
     rate,
     resting_state,
 )
-from subzero.steady_motion.steady_pull import SteadyPull
-from vehicle import Vehicle, VehicleNumbers
+from subzero.steady_motion.motion import Motion
+from vehicle import Vehicle
 
 
 def is_glider(hull: Vehicle) -> bool:
@@ -52,38 +52,19 @@ def channel_demands(hull: Vehicle, x: np.ndarray) -> list[Demand]:
     ]
 
 
-@dataclass(frozen=True, kw_only=True)
-class GliderMotion:
-    """The requested motion of a glider, with which pull beyond the formula's.
+class GliderMotion(Motion):
+    """The requested motion of a glider."""
 
-    Attributes:
-        asked: which motion.
-        hull: whose masses and engines.
-        numbers: of the hull, its actuators without limits.
-        places: of slide, turn and volume among the channels.
-        pull: of the cable.
-        extra: added to that pull.
-    """
+    @cached_property
+    def places(self) -> list[int]:
+        """Places of slide, turn and volume among the channels."""
+        names = [channel.name for channel in self.hull.channels]
+        slide = names.index(f"{self.hull.moving_masses[0][0]}_slide")
+        return [slide, slide + 1, names.index(self.hull.buoyancy_engines[0][0])]
 
-    asked: Asked
-    hull: Vehicle
-    numbers: VehicleNumbers
-    places: tuple[int, int, int]
-    pull: SteadyPull
-    extra: np.ndarray
-
-    @classmethod
-    def of(cls, asked: Asked, hull: Vehicle, numbers: VehicleNumbers, pull: SteadyPull) -> GliderMotion:
-        """Return the requested motion of a glider."""
-        names = [channel.name for channel in hull.channels]
-        slide = names.index(f"{hull.moving_masses[0][0]}_slide")
-        places = (slide, slide + 1, names.index(hull.buoyancy_engines[0][0]))
-        return cls(asked=asked, hull=hull, numbers=numbers, places=places, pull=pull, extra=np.zeros(6))
-
-    def part(self, share: float) -> GliderMotion:
-        """Return the same with a share of the turn."""
-        turn_rate = share * self.asked.turn_rate
-        return replace(self, asked=replace(self.asked, turn_rate=turn_rate), extra=share * self.extra)
+    def asked_part(self, share: float) -> Asked:
+        """Return a share of the turn."""
+        return replace(self.asked, turn_rate=share * self.asked.turn_rate)
 
     def guess(self) -> np.ndarray:
         """Return the unknowns (7,) to begin with: straight along the path, weight against drag, level mass balanced."""
@@ -101,16 +82,9 @@ class GliderMotion:
         slide, turn, litres, roll, pitch, v, w = y
         x = resting_state(self.hull)
         x[ROLL], x[PITCH] = roll, pitch
-        spin = (-sin(pitch), cos(pitch) * sin(roll), cos(pitch) * cos(roll))
-        x[VELOCITY] = self.asked.speed, v, w, *(self.asked.turn_rate * part for part in spin)
-        x[CHANNELS][list(self.places)] = slide, turn, 1e-3 * litres
+        x[VELOCITY] = self.velocity(roll, pitch, v, w)
+        x[CHANNELS][self.places] = slide, turn, 1e-3 * litres
         return x
-
-    def left(self, y: np.ndarray) -> np.ndarray:
-        """Return the residual of the seven equations."""
-        x = self.state(y)
-        rates = rate(x, x[12:], self.numbers, self.pull.wrench(x[VELOCITY]) + self.extra)
-        return np.append(rates[VELOCITY], rates[DEPTH] - self.asked.depth_rate)
 
     def is_near(self, y: np.ndarray) -> bool:
         """Return whether unknowns are those of an upright hull, not of another balance."""

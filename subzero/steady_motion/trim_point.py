@@ -37,20 +37,18 @@ from subzero.steady_motion.hull_state_space import (
     demands,
     ideal,
     listed_commands,
-    resting_state,
     thruster_demands,
 )
-from subzero.steady_motion.propeller_motion import Motion
+from subzero.steady_motion.motion import Motion, PropellerMotion
 from subzero.steady_motion.steady_pull import SteadyPull
 from subzero.steady_motion.thruster_motion import ThrusterMotion, is_on_thrusters, refusal
 from vehicle import Vehicle
 
 RESIDUAL = 1e-9
 """Tolerances of accelerations and depth rate. [m/s2, rad/s2, m/s]"""
-AnyMotion = Motion | ThrusterMotion | GliderMotion
 
 
-def solved(motion: AnyMotion, y: np.ndarray) -> np.ndarray | None:
+def solved(motion: Motion, y: np.ndarray) -> np.ndarray | None:
     """Return the unknowns of a motion from a guess; None if they are not found."""
     from scipy.optimize import root
 
@@ -227,14 +225,10 @@ def _trim(model: Model, asked: Asked, pull_of: Pull | None = None) -> Trim:
     )
 
 
-def _motion(hull: Vehicle, asked: Asked, pull: SteadyPull) -> AnyMotion:
-    """Return the requested motion of a hull, on its thrusters or on propeller and fins."""
-    numbers = ideal(hull).numbers()
-    if is_on_thrusters(hull):
-        return ThrusterMotion.of(asked, hull, numbers, pull)
-    if is_glider(hull):
-        return GliderMotion.of(asked, hull, numbers, pull)
-    return Motion(asked=asked, numbers=numbers, rest=resting_state(hull), pull=pull, extra=np.zeros(6))
+def _motion(hull: Vehicle, asked: Asked, pull: SteadyPull) -> Motion:
+    """Return the requested motion of a hull by what drives it."""
+    kind = ThrusterMotion if is_on_thrusters(hull) else GliderMotion if is_glider(hull) else PropellerMotion
+    return kind(asked=asked, hull=hull, numbers=ideal(hull).numbers(), pull=pull)
 
 
 def _commands(hull: Vehicle, x: np.ndarray) -> np.ndarray:
@@ -251,7 +245,7 @@ def _demands(hull: Vehicle, x: np.ndarray) -> list[Demand]:
     return thruster_demands(hull, x) if is_on_thrusters(hull) else demands(hull, x)
 
 
-def _balanced(hull: Vehicle, motion: AnyMotion) -> np.ndarray:
+def _balanced(hull: Vehicle, motion: Motion) -> np.ndarray:
     """Return the state of a steady motion, at once from straight level motion, or in steps."""
     guess = motion.guess()
     direct = solved(motion, guess)
