@@ -10,7 +10,7 @@ current only carries the track.
 A motion that is impossible is refused with the reason, and the largest motion that is possible (`NoTrimError`).
 
 The force of the cable is that of `subzero.steady_motion.steady_pull`. A vehicle on thrusters has other unknowns
-(`thruster_motion`), and may stand still; a glider has, too (`glider_motion`), and must sink or rise.
+(`thruster_motion`), and may stand still; a glider has, too, and must sink or rise.
 """
 
 from __future__ import annotations
@@ -25,8 +25,6 @@ import numpy as np
 from subzero.files.text_repr import Overview
 from subzero.model import Model
 from subzero.steady_motion.asked import FASTEST, Asked, NoTrimError
-from subzero.steady_motion.glider_motion import GliderMotion, channel_demands, is_glider
-from subzero.steady_motion.glider_motion import refusal as glider_refusal
 from subzero.steady_motion.hull_state_space import (
     ACTUATORS,
     STATE_NAMES,
@@ -39,7 +37,14 @@ from subzero.steady_motion.hull_state_space import (
     listed_commands,
     thruster_demands,
 )
-from subzero.steady_motion.motion import Motion, PropellerMotion
+from subzero.steady_motion.motion import (
+    GliderMotion,
+    Motion,
+    PropellerMotion,
+    channel_demands,
+    glider_refusal,
+    is_glider,
+)
 from subzero.steady_motion.steady_pull import SteadyPull
 from subzero.steady_motion.thruster_motion import ThrusterMotion, is_on_thrusters, refusal
 from vehicle import Vehicle
