@@ -27,7 +27,6 @@ from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source
 from scenarios.parts import (
     PATTERNS,
-    Leaf,
     Part,
     changeable,
     leaves,
@@ -52,7 +51,7 @@ from scenarios.quantities import (
     by_field,
 )
 from scenarios.trial import SETPOINT, Trial
-from scenarios.vehicle_lists import OPTIONAL_SECTIONS, optional_leaves
+from scenarios.vehicle_lists import OPTIONAL_SECTIONS, Leaf, optional_leaves
 from subzero.errors import real
 from subzero.errors import short as shown
 

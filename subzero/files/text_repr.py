@@ -56,23 +56,23 @@ class Overview(NamedTuple):
         return [*kept, ("…", f"{len(self.rows) - len(kept)} more")]
 
 
-class Told(Protocol):
+class HasOverview(Protocol):
     """A value that has an overview."""
 
     def _overview(self) -> Overview: ...
 
 
-Class = TypeVar("Class", bound=type[Told])
+Class = TypeVar("Class", bound=type[HasOverview])
 
 
 def shown(kind: Class) -> Class:
     """Let a prompt and a notebook show the overview of a class."""
 
-    def text(self: Told) -> str:
+    def text(self: HasOverview) -> str:
         """Return what one reads first, in a few lines."""
         return self._overview().text()
 
-    def html(self: Told) -> str:
+    def html(self: HasOverview) -> str:
         """Return the same for a notebook."""
         return self._overview().html()
 
