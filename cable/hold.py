@@ -158,29 +158,20 @@ def _search(
                 break
     else:
         steps, scale = _sink_onto(bed, line, water, c, brake, work, scale)
-    return _press_below(surface, line, water, c, brake, work, steps, scale)
+    if surface is None or steps < 0:
+        return steps, scale
+    return _press_below(surface, line, water, c, brake, work, scale)
 
 
 def _press_below(
-    surface: float | None,
-    line: Line,
-    water: Water,
-    c: Any,
-    brake: DrumNumbers,
-    work: Load,
-    steps: int,
-    scale: float,
+    surface: float, line: Line, water: Water, c: Any, brake: DrumNumbers, work: Load, scale: float
 ) -> tuple[int, float]:
     """Bring a line at rest in water everywhere to rest below a surface, which comes down on it and gets sharper.
 
     Each shape is near the next: the surface is as soft as the way that it comes down in a stage, and then ever less.
     """
-    if surface is None or steps < 0:
-        return steps, scale
-    N, radius = (
-        int(line.ends.count),
-        0.5 * float(np.min(c.whole[-1] if c.whole[-1] > 0.0 else c.section[0, -1])),
-    )
+    N = int(line.ends.count)
+    radius = 0.5 * float(np.min(c.whole[-1] if c.whole[-1] > 0.0 else c.section[0, -1]))
     above = surface - float(line.ends.origin[2] + line.position[NOW, : N + 1, 2].min())
     stage = max(above / LIDS, radius)
     levels = (
