@@ -63,11 +63,9 @@ def force_along(unmodelled: UnmodelledForce, setting: Setting, truth: Truth) -> 
 
 def factors_of(setting: Setting, truth: Truth) -> np.ndarray:
     """Return the factors of features (n, len(FACTORS)) along a truth, see `subzero.external_force`."""
-    r, water, out = (
-        truth.run.recording,
-        setting.model.water(),
-        np.zeros((truth.run.times.size, len(FACTORS))),
-    )
+    r = truth.run.recording
+    water = setting.model.water()
+    out = np.zeros((truth.run.times.size, len(FACTORS)))
     for row, time in enumerate(truth.run.times):
         nu_r = r.state[row, 7:13].copy()
         nu_r[:3] -= r.rotation[row].T @ water.at(r.state[row, :3], time)
@@ -153,10 +151,8 @@ def fouling_shed(draw: Draw) -> UnmodelledForce:
 
 def waves(draw: Draw) -> UnmodelledForce:
     """A slow swell across or from below."""
-    axis, time = (
-        str(draw.rng.choice(["Y", "Z"])),
-        np.arange(0.0, draw.duration + HISTORY_STEP_S, HISTORY_STEP_S),
-    )
+    axis = str(draw.rng.choice(["Y", "Z"]))
+    time = np.arange(0.0, draw.duration + HISTORY_STEP_S, HISTORY_STEP_S)
     period, phase = draw.between(4.0, 6.0), draw.between(0.0, 2.0 * np.pi)
     wave = draw.force * abs(draw.size(0.25, 0.8)) * np.sin(2.0 * np.pi * time / period + phase)
     words = "sideways" if axis == "Y" else "up and down"
