@@ -284,13 +284,18 @@ def _check_bends(found: Equilibrium) -> None:
         raise HoldError(message)
 
 
+def _numbers_of(given: object) -> np.ndarray:
+    """Return given values as an array of numbers, empty for anything else."""
+    try:
+        found = np.array(given)
+    except (TypeError, ValueError, OverflowError):
+        return np.empty(0)
+    return found.astype(float) if found.dtype.kind in "iuf" else np.empty(0)
+
+
 def _checked_ends(ends: Sequence[Place] | np.ndarray) -> np.ndarray:
     """Return the ends as finite numbers (2, 3)."""
-    try:
-        places = np.array(ends)
-    except (TypeError, ValueError, OverflowError):
-        places = np.empty(0)
-    places = places.astype(float) if places.dtype.kind in "iuf" else np.empty(0)
+    places = _numbers_of(ends)
     if places.shape != (2, 3) or not np.isfinite(places).all():
         message = f"hold: ends must be two places of three finite numbers (north, east, down in m); got {short(ends)}."
         raise HoldError(message)
@@ -342,11 +347,7 @@ def _segments(length: float, given: float | None) -> int:
 
 def _checked_start(start: Place, places: np.ndarray) -> np.ndarray:
     """Return node positions relative to the second end."""
-    try:
-        nodes = np.array(start)
-    except (TypeError, ValueError, OverflowError):
-        nodes = np.empty(0)
-    nodes = nodes.astype(float) if nodes.dtype.kind in "iuf" else np.empty(0)
+    nodes = _numbers_of(start)
     if nodes.ndim != 2 or nodes.shape[0] < 2 or nodes.shape[1] != 3 or not np.isfinite(nodes).all():
         message = f"hold: start must be finite node positions (n, 3), two at least; got shape {nodes.shape}."
         raise HoldError(message)

@@ -137,8 +137,7 @@ def parameter_unit(trial: Trial, name: str) -> str:
     Raises:
         ScenarioError: the trial has no such number.
     """
-    parameter(trial, name)
-    row = _known(trial)[_list_of(name)][0]
+    row = quantity_of(trial, name)
     return row.unit if isinstance(row, Quantity) else str(row["unit"])
 
 
