@@ -26,12 +26,14 @@ FIGURE = Path(__file__).parent.parent / "docs" / "figures" / "paper_scheme.png"
 def pull_out_paper(tow_velocity, duration, step, *, reading="tangent", implicit=False) -> BoxHistory:
     """Run the paper's scheme; with the states of its nodes, which `cable.pull_out` does not show."""
     scheme = cable.Paper(time_step=step, reading=reading, implicit=implicit)
-    return feng_allen.pull_out_paper(PullOut.of(tow_velocity, duration), scheme)
+    return feng_allen.pull_out_paper(PullOut(tow_velocity=tow_velocity, duration=duration), scheme)
 
 
 def pull_out_boxes(tow_velocity, duration, step) -> BoxHistory:
     """Run equation (7) in boxes."""
-    return feng_allen.pull_out_boxes(PullOut.of(tow_velocity, duration), cable.Equation7(time_step=step))
+    return feng_allen.pull_out_boxes(
+        PullOut(tow_velocity=tow_velocity, duration=duration), cable.Equation7(time_step=step)
+    )
 
 
 def ahead(_time):

@@ -19,7 +19,7 @@ from cable.range_graph import dataset_of, figure_of
 from cable.sea_bed import SeaBed
 from cable.sections import AnyCable
 from subzero.errors import BadValueError, real, short
-from subzero.files.text_repr import Overview
+from subzero.files.text_repr import Overview, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,6 +66,7 @@ class Outcome:
     energy_residual: float = nan
 
 
+@shown
 @dataclass(frozen=True, kw_only=True)
 class History:
     """The record of a cable run.
@@ -185,14 +186,6 @@ class History:
                 run[name].attrs.update({"units": unit, "long_name": words} if unit else {"long_name": words})
         return run
 
-    def __repr__(self) -> str:
-        """Return the run in a few lines."""
-        return self._overview().text()
-
-    def _repr_html_(self) -> str:
-        """Return the same for a notebook."""
-        return self._overview().html()
-
     def _overview(self) -> Overview:
         """Return how far it came, how much cable there is, and how it pulls."""
         largest = int(np.argmax(self.tow_tension))
@@ -229,6 +222,7 @@ def _filled(rows: Sequence[np.ndarray]) -> np.ndarray:
     return filled
 
 
+@shown
 @dataclass(frozen=True, kw_only=True)
 class Equilibrium:
     """A cable at rest between two ends.
@@ -313,14 +307,6 @@ class Equilibrium:
             subzero.UserError: a slack cable, one that nothing brings back to its shape, or more than 1000 segments.
         """
         return find_modes(self, count)
-
-    def __repr__(self) -> str:
-        """Return the cable at rest in a few lines."""
-        return self._overview().text()
-
-    def _repr_html_(self) -> str:
-        """Return the same for a notebook."""
-        return self._overview().html()
 
     def _overview(self) -> Overview:
         """Return its length, its span, and how it pulls at both ends."""

@@ -158,29 +158,20 @@ def _search(
                 break
     else:
         steps, scale = _sink_onto(bed, line, water, c, brake, work, scale)
-    return _press_below(surface, line, water, c, brake, work, steps, scale)
+    if surface is None or steps < 0:
+        return steps, scale
+    return _press_below(surface, line, water, c, brake, work, scale)
 
 
 def _press_below(
-    surface: float | None,
-    line: Line,
-    water: Water,
-    c: Any,
-    brake: DrumNumbers,
-    work: Load,
-    steps: int,
-    scale: float,
+    surface: float, line: Line, water: Water, c: Any, brake: DrumNumbers, work: Load, scale: float
 ) -> tuple[int, float]:
     """Bring a line at rest in water everywhere to rest below a surface, which comes down on it and gets sharper.
 
     Each shape is near the next: the surface is as soft as the way that it comes down in a stage, and then ever less.
     """
-    if surface is None or steps < 0:
-        return steps, scale
-    N, radius = (
-        int(line.ends.count),
-        0.5 * float(np.min(c.whole[-1] if c.whole[-1] > 0.0 else c.section[0, -1])),
-    )
+    N = int(line.ends.count)
+    radius = 0.5 * float(np.min(c.whole[-1] if c.whole[-1] > 0.0 else c.section[0, -1]))
     above = surface - float(line.ends.origin[2] + line.position[NOW, : N + 1, 2].min())
     stage = max(above / LIDS, radius)
     levels = (
@@ -293,13 +284,18 @@ def _check_bends(found: Equilibrium) -> None:
         raise HoldError(message)
 
 
+def _numbers_of(given: object) -> np.ndarray:
+    """Return given values as an array of numbers, empty for anything else."""
+    try:
+        found = np.array(given)
+    except (TypeError, ValueError, OverflowError):
+        return np.empty(0)
+    return found.astype(float) if found.dtype.kind in "iuf" else np.empty(0)
+
+
 def _checked_ends(ends: Sequence[Place] | np.ndarray) -> np.ndarray:
     """Return the ends as finite numbers (2, 3)."""
-    try:
-        places = np.array(ends)
-    except (TypeError, ValueError, OverflowError):
-        places = np.empty(0)
-    places = places.astype(float) if places.dtype.kind in "iuf" else np.empty(0)
+    places = _numbers_of(ends)
     if places.shape != (2, 3) or not np.isfinite(places).all():
         message = f"hold: ends must be two places of three finite numbers (north, east, down in m); got {short(ends)}."
         raise HoldError(message)
@@ -351,11 +347,7 @@ def _segments(length: float, given: float | None) -> int:
 
 def _checked_start(start: Place, places: np.ndarray) -> np.ndarray:
     """Return node positions relative to the second end."""
-    try:
-        nodes = np.array(start)
-    except (TypeError, ValueError, OverflowError):
-        nodes = np.empty(0)
-    nodes = nodes.astype(float) if nodes.dtype.kind in "iuf" else np.empty(0)
+    nodes = _numbers_of(start)
     if nodes.ndim != 2 or nodes.shape[0] < 2 or nodes.shape[1] != 3 or not np.isfinite(nodes).all():
         message = f"hold: start must be finite node positions (n, 3), two at least; got shape {nodes.shape}."
         raise HoldError(message)

@@ -30,7 +30,7 @@ from cable.doubts import SLACK_SHARE
 from cable.sea_bed import ROUNDED, SeaBed
 from cable.sections import COLUMNS, SectionedCable
 from subzero.errors import UserError, whole
-from subzero.files.text_repr import Overview
+from subzero.files.text_repr import Overview, shown
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -61,6 +61,7 @@ LABELS = {
 """Name in the dataset → unit and words."""
 
 
+@shown
 @dataclass(frozen=True, kw_only=True)
 class Modes:
     """The natural modes of a cable, from the lowest frequency on.
@@ -134,14 +135,6 @@ class Modes:
         panels[0].legend(frameon=False, ncols=3)
         panels[-1].set_xlabel("distance along the cable [m]")
         return figure
-
-    def __repr__(self) -> str:
-        """Return the periods in a few lines."""
-        return self._overview().text()
-
-    def _repr_html_(self) -> str:
-        """Return the same for a notebook."""
-        return self._overview().html()
 
     def _overview(self) -> Overview:
         """Return period, frequency and damping of each."""

@@ -14,8 +14,10 @@ import numpy as np
 
 from cable.clamps import Clamps
 from cable.current import Current
+from cable.drum import DrumProperties
 from cable.history import Equilibrium, History
 from cable.moving_end import time_loop
+from cable.properties import CableProperties
 from cable.schemes import Equation7, Lumped, MovingEnd, Options, Paper
 from cable.sea_bed import SeaBed
 from cable.sections import AnyCable
@@ -32,6 +34,7 @@ from cable.task import (
     MovingDrum,
     PullOut,
     Tow,
+    current_of,
 )
 from cable.tow_path import Velocity
 from subzero.arguments import checked_arguments
@@ -140,8 +143,26 @@ def pull_out(
             (Bad values are a ValueError, too.)
     """
     row, options = _chosen(scheme)
-    task = PullOut.of(
-        tow_velocity, duration, cable=cable, drum=drum, current=current, start=start, bed=bed, clamps=clamps
+    origin = np.zeros(3)
+    if isinstance(start, Equilibrium):
+        cable = start.cable if cable is None else cable
+        origin, current = (start.shape[-1], start.current) if current is None else (origin, current)
+        bed = start.bed if bed is None else bed
+        clamps = start.clamps if clamps is None else clamps
+        surface = start.surface if surface is None else surface
+    drum = DrumProperties() if drum is None else drum
+    task = PullOut(
+        tow_velocity=tow_velocity,
+        duration=duration,
+        cable=CableProperties() if cable is None else cable,
+        drum=drum.drum if isinstance(drum, MovingDrum) else drum,
+        drum_velocity=drum.velocity if isinstance(drum, MovingDrum) else None,
+        current=current_of(current),
+        start=start,
+        origin=origin,
+        bed=bed,
+        clamps=clamps,
+        surface=surface,
     )
     _refuse_unknown(task, row, options)
     return row.pull_out(task, options)
@@ -194,12 +215,12 @@ def tow(
     if row.tow is None:
         able = " or ".join(repr(name) for name, other in SCHEMES.items() if other.tow)
         raise BadValueError(f"scheme '{options.name}' cannot tow a free end; choose {able}.")
-    task = Tow.of(
-        tow_velocity,
-        length,
-        duration,
-        cable=cable,
-        current=current,
+    task = Tow(
+        tow_velocity=tow_velocity,
+        length=length,
+        duration=duration,
+        cable=CableProperties() if cable is None else cable,
+        current=current_of(current),
         drogue_drag_area=drogue_drag_area,
         bed=bed,
         clamps=clamps,

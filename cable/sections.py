@@ -241,13 +241,11 @@ class SectionedCable:
         """Return the plain numbers that compiled code takes; those of the first section are selected."""
         if clamps is not None:
             clamps.numbers(self)  # refuses
-        rows, ends, points, places, radii = (
-            np.zeros((MOST, len(COLUMNS))),
-            np.full(MOST, np.inf),
-            np.zeros((MOST, 6)),
-            np.zeros(MOST),
-            np.zeros(MOST),
-        )
+        rows = np.zeros((MOST, len(COLUMNS)))
+        ends = np.full(MOST, np.inf)
+        points = np.zeros((MOST, 6))
+        places = np.zeros(MOST)
+        radii = np.zeros(MOST)
         ground = NO_BED if bed is None else bed
         for k, section in enumerate(self.sections):
             c: Any = section.cable.numbers(ground)

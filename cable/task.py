@@ -73,62 +73,29 @@ class PullOut:
         bed: the sea bed, in the axes of the current; None without.
         clamps: directions in which it leaves its ends; None for hinges.
         surface: depth of the free surface, in the axes of the current; None for water everywhere. [m]
+
+    Raises:
+        subzero.UserError: a start or a duration that makes no sense.
     """
 
     tow_velocity: Velocity
     duration: float
-    cable: AnyCable
-    drum: Drum
-    drum_velocity: Velocity | None
-    current: Current
-    start: float | Equilibrium
-    origin: np.ndarray
-    bed: SeaBed | None
-    clamps: Clamps | None
-    surface: float | None
+    cable: AnyCable = field(default_factory=CableProperties)
+    drum: Drum = field(default_factory=DrumProperties)
+    drum_velocity: Velocity | None = None
+    current: Current = field(default_factory=lambda: Current.uniform(np.zeros(3)))
+    start: float | Equilibrium = 0.0
+    origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    bed: SeaBed | None = None
+    clamps: Clamps | None = None
+    surface: float | None = None
 
-    @classmethod
-    def of(
-        cls,
-        tow_velocity: Velocity,
-        duration: float,
-        *,
-        cable: AnyCable | None = None,
-        drum: Drum | MovingDrum | None = None,
-        current: Sequence[float] | np.ndarray | Current | None = None,
-        start: float | Equilibrium = 0.0,
-        bed: SeaBed | None = None,
-        clamps: Clamps | None = None,
-        surface: float | None = None,
-    ) -> PullOut:
-        """Return the task of `cable.pull_out`, with defaults filled in.
-
-        Raises:
-            subzero.UserError: what makes no sense by itself.
-        """
-        origin = np.zeros(3)
-        if isinstance(start, Equilibrium):
-            cable = start.cable if cable is None else cable
-            origin, current = (start.shape[-1], start.current) if current is None else (origin, current)
-            bed = start.bed if bed is None else bed
-            clamps = start.clamps if clamps is None else clamps
-            surface = start.surface if surface is None else surface
-        else:
-            start = checked("", "start", start, least=0.0, unit="m, or what cable.hold gives")
-        cable, drum = _cable_of(cable), DrumProperties() if drum is None else drum
-        return cls(
-            tow_velocity=tow_velocity,
-            duration=checked_duration(duration),
-            cable=cable,
-            drum=drum.drum if isinstance(drum, MovingDrum) else drum,
-            drum_velocity=drum.velocity if isinstance(drum, MovingDrum) else None,
-            current=current_of(current),
-            start=start,
-            origin=origin,
-            bed=bed,
-            clamps=clamps,
-            surface=surface,
-        )
+    def __post_init__(self) -> None:
+        """Raise an error if the start or the duration is not valid."""
+        if not isinstance(self.start, Equilibrium):
+            start = checked("", "start", self.start, least=0.0, unit="m, or what cable.hold gives")
+            object.__setattr__(self, "start", start)
+        _keep_duration(self)
 
     @property
     def wet_length(self) -> float:
@@ -162,6 +129,9 @@ class Tow:
         bed: the sea bed, at places relative to the tow point at the start; None without.
         clamps: direction in which it leaves the tow point; None for a hinge.
         surface: depth of the free surface, relative to the tow point at the start; None for water everywhere. [m]
+
+    Raises:
+        subzero.UserError: a length, a duration or a drogue that makes no sense.
     """
 
     tow_velocity: Velocity
@@ -174,36 +144,12 @@ class Tow:
     clamps: Clamps | None
     surface: float | None
 
-    @classmethod
-    def of(
-        cls,
-        tow_velocity: Velocity,
-        length: float,
-        duration: float,
-        *,
-        cable: AnyCable | None = None,
-        current: Sequence[float] | np.ndarray | Current | None = None,
-        drogue_drag_area: float = 0.0,
-        bed: SeaBed | None = None,
-        clamps: Clamps | None = None,
-        surface: float | None = None,
-    ) -> Tow:
-        """Return the task of `cable.tow`, with defaults filled in.
-
-        Raises:
-            subzero.UserError: what makes no sense by itself.
-        """
-        return cls(
-            tow_velocity=tow_velocity,
-            length=checked("", "length", length, above=0.0),
-            duration=checked_duration(duration),
-            cable=_cable_of(cable),
-            current=current_of(current),
-            drogue_drag_area=checked("", "drogue_drag_area", drogue_drag_area, least=0.0),
-            bed=bed,
-            clamps=clamps,
-            surface=surface,
-        )
+    def __post_init__(self) -> None:
+        """Raise an error if the length, the duration or the drogue is not valid."""
+        object.__setattr__(self, "length", checked("", "length", self.length, above=0.0))
+        _keep_duration(self)
+        area = checked("", "drogue_drag_area", self.drogue_drag_area, least=0.0)
+        object.__setattr__(self, "drogue_drag_area", area)
 
     def asks_for(self) -> list[str]:
         """Return the features of `EVERYTHING` that it asks for."""
@@ -227,9 +173,10 @@ def _asked_of(task: PullOut | Tow) -> list[str]:
     return [what for what, is_asked in asked.items() if is_asked]
 
 
-def checked_duration(value: float) -> float:
-    """Return a duration as a float; refuse one that is too short to be halved. [s]."""
-    return checked("", "duration", value, least=SHORTEST_S, unit="s")
+def _keep_duration(task: PullOut | Tow) -> None:
+    """Keep the duration of a task as a float; refuse one that is too short to be halved."""
+    duration = checked("", "duration", task.duration, least=SHORTEST_S, unit="s")
+    object.__setattr__(task, "duration", duration)
 
 
 def current_of(current: Sequence[float] | np.ndarray | Current | None) -> Current:
@@ -244,8 +191,3 @@ def uniform(cable: AnyCable) -> CableProperties:
     if isinstance(cable, SectionedCable):
         raise BadValueError(f"This scheme does not know {SECTIONS}; use 'moving_end'.")
     return cable
-
-
-def _cable_of(cable: AnyCable | None) -> AnyCable:
-    """Return the cable, that of Table 1 when none is given."""
-    return CableProperties() if cable is None else cable

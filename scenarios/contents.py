@@ -131,12 +131,11 @@ def _kind_of(source: Source) -> str:
     raise ScenarioError([source.problem("", why, "subzero new my_trial.toml makes one to begin with.")])
 
 
-def contents(name_or_path: str | Path, trial: Trial | None = None) -> Contents:
+def contents(name_or_path: str | Path) -> Contents:
     """Return the contents of a file.
 
     Args:
         name_or_path: name of a shipped trial, vehicle or cable, or the path of a TOML file.
-        trial: the trial, if it has been read already.
 
     Raises:
         ScenarioError: it cannot be used; with every problem.
@@ -145,13 +144,8 @@ def contents(name_or_path: str | Path, trial: Trial | None = None) -> Contents:
     if kind == "trial":
         from scenarios.reader import load
 
-        trial = trial or load(name_or_path)
-        return _of_trial(trial, source)
-    part = read_whole(kind, source)
-    said = first_sentence(source.text)
-    return Contents(
-        kind=kind, name=source.name, description=said, numbers=tuple(_of_part(kind, part)), parts={}
-    )
+        return _of_trial(load(name_or_path), source)
+    return _of_whole(kind, source.name, source.text, read_whole(kind, source))
 
 
 def contents_of_text(kind: str, name: str, text: str) -> Contents:
@@ -163,6 +157,11 @@ def contents_of_text(kind: str, name: str, text: str) -> Contents:
     part, problems = part_of(parsed(name, Path(), text), kind)
     if problems:
         raise ScenarioError(problems)
+    return _of_whole(kind, name, text, part)
+
+
+def _of_whole(kind: str, name: str, text: str, part: Part) -> Contents:
+    """Return the contents of a vehicle or a cable."""
     said = first_sentence(text)
     return Contents(kind=kind, name=name, description=said, numbers=tuple(_of_part(kind, part)), parts={})
 

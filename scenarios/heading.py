@@ -9,7 +9,7 @@ rate, else what a simulation does, else none. So the turns of a vehicle in a gap
 A sample that was averaged or interpolated across north, or shows the other end of the needle, leads away from its
 neighbours, and back. Such samples are found as those between two that join one another directly.
 
-Pure functions, in degrees unless another `turn` is given. Whether a heading that is shifted for good is right is not
+Pure functions, in degrees unless another unit is named. Whether a heading that is shifted for good is right is not
 decided here.
 """
 
@@ -30,9 +30,9 @@ LOOKED_BACK = 1000
 """A sample is held against the ends of so many stretches before it: work grows no faster than the record. [-]"""
 
 
-def shortest(angle: float, turn: float = math.tau) -> float:
-    """Return an angle without whole turns, within half a turn either way; one that is there already is not changed."""
-    return angle if abs(angle) <= 0.5 * turn else math.remainder(angle, turn)
+def shortest(angle: float) -> float:
+    """Return an angle [rad] without whole turns, within half a turn either way; one that is there is not changed."""
+    return angle if abs(angle) <= math.pi else math.remainder(angle, math.tau)
 
 
 def turned(heading: np.ndarray, like: np.ndarray | float) -> np.ndarray:

@@ -27,7 +27,6 @@ from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source
 from scenarios.parts import (
     PATTERNS,
-    Leaf,
     Part,
     changeable,
     leaves,
@@ -52,7 +51,7 @@ from scenarios.quantities import (
     by_field,
 )
 from scenarios.trial import SETPOINT, Trial
-from scenarios.vehicle_lists import OPTIONAL_SECTIONS, optional_leaves
+from scenarios.vehicle_lists import OPTIONAL_SECTIONS, Leaf, optional_leaves
 from subzero.errors import real
 from subzero.errors import short as shown
 
@@ -138,8 +137,7 @@ def parameter_unit(trial: Trial, name: str) -> str:
     Raises:
         ScenarioError: the trial has no such number.
     """
-    parameter(trial, name)
-    row = _known(trial)[_list_of(name)][0]
+    row = quantity_of(trial, name)
     return row.unit if isinstance(row, Quantity) else str(row["unit"])
 
 

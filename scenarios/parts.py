@@ -30,6 +30,7 @@ from scenarios.similar_vehicle import BASE, complete
 from scenarios.similar_vehicle import SECTION as KNOWN
 from scenarios.vehicle_lists import (
     DERIVATIVES,
+    Leaf,
     factor_names,
     optional_leaves,
     primed_names,
@@ -60,10 +61,6 @@ OPTIONAL = {
 
 ABOVE_ZERO = ("mass", "density", "diameter", "radius", "area", "inertia")
 """Where the pattern gives no limits, a number whose name ends in one of these must be above zero."""
-
-Leaf = Mapping[str, Any]
-Leaves = dict[str, Leaf]
-"""Dotted key, such as ``hull.mass``, → its inline table."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -400,10 +400,8 @@ def _header_problems(
             continue
         if column not in allowed:
             more = {row.name for row in COMMANDS} < set(allowed)
-            why, remedy = (
-                "there is no such column",
-                (nearest_and_all if more else nearest_or_all)(column, allowed),
-            )
+            why = "there is no such column"
+            remedy = (nearest_and_all if more else nearest_or_all)(column, allowed)
         elif column in columns[:at]:
             why, remedy = "this column stands twice", "Keep one of the two."
         else:

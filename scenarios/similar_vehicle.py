@@ -24,6 +24,11 @@ A speed at a command fixes the propeller: its diameter where both are known, els
 A number that the file gives itself stands as it is. One that is derived keeps the range of the base, scaled, and half
 of its width is its tolerance: it is known no better than of a vehicle that was never measured. What does not depend on
 the size (coefficients, servos) is that of the base, a guess.
+
+`tail_angle_deg` turns the tail about the axis: a cross of rudder and stern-planes becomes a list of four fins.
+Each fin keeps area, coefficients, station and arm of the one that it was, and follows rudder, mean and difference of
+the stern-planes, behind their servos (`vehicle.fin_list`). At 45 degrees four fins of one shape turn and pitch as
+the two of the cross did, as 4 sin² 45° = 2, and roll twice as much.
 """
 
 from __future__ import annotations
@@ -39,7 +44,6 @@ import numpy as np
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source
 from scenarios.quantities import KNOWN
-from scenarios.turned_tail import CORNERS, turn_tail
 from subzero.errors import real
 
 Leaf = Mapping[str, Any]
@@ -96,6 +100,18 @@ POWERS = _powers("""
 """)
 """Number → the powers of length and diameter that it grows with. The origin is the hull's centre."""
 
+CORNERS = {
+    "lower_starboard": ("stern_planes", 0.0),
+    "lower_port": ("rudder", 90.0),
+    "upper_port": ("stern_planes", 180.0),
+    "upper_starboard": ("rudder", -90.0),
+}
+"""Name of a fin → the section that it was in, and the direction of its span in the cross [degree]."""
+SHAPE = (
+    *("area", "lift_slope", "aspect_ratio", "span_efficiency"),
+    *("profile_drag_coefficient", "normal_force_coefficient", "stall_angle"),
+)
+SHARES = ("rudder_share", "plane_share", "roll_share")
 FULL_SPEED_MARGIN = 1.2
 """The motor reaches the known speed of the propeller with so much to spare: a drive is not sized without. [-]"""
 FULLEST, LEAST = 0.98, 0.1
@@ -195,8 +211,35 @@ def complete(source: Source, base: Mapping[str, Leaf], leaves: Mapping[str, Leaf
         # A key that the base does not have is of a listed actuator or a derivative, or is refused later.
         table.setdefault(section, {}).setdefault(name, leaf)
     if angle := real(source.table.get(SECTION, {}).get("tail_angle_deg")):
-        turn_tail(table, angle)
+        _turn_tail(table, angle)
     return replace(source, table=table, text="\n".join(_text(source, table)) + "\n")
+
+
+def _turn_tail(table: dict[str, dict[str, Any]], degrees: float) -> None:
+    """Put four listed fins, turned by an angle from the cross, in the place of rudder and stern-planes.
+
+    Args:
+        table: section → key → inline table of a complete vehicle; changed, but for numbers of these fins that it has.
+        degrees: how far the tail is turned, starboard down. [degree]
+    """
+    source = f"derived: of the cross, turned by {degrees:g} degrees"
+    for name, (section, cross) in CORNERS.items():
+        was, angle = table[section], math.radians(cross + degrees)
+        servo = table["rudder_servo" if section == "rudder" else "stern_plane_port_servo"]
+        arm = float(was["arm"]["value"])
+        place = {"y": arm * math.cos(angle), "z": arm * math.sin(angle)}
+        fin: dict[str, Any] = {key: was[key] for key in SHAPE} | {"x": was["station"]}
+        fin |= {
+            key: {"value": round(value, 9), "unit": "m", "source": source} for key, value in place.items()
+        }
+        fin["span_angle"] = {"value": round(angle, 9), "unit": "rad", "source": source}
+        fin |= {
+            key: {"value": 1.0, "unit": "1", "source": "derived: it follows as a tail does"} for key in SHARES
+        }
+        fin |= {key: servo[key] for key in ("lag", "rate_limit", "deflection_limit")}
+        table[f"fins.{name}"] = fin | table.get(f"fins.{name}", {})
+    for section in ("rudder", "stern_planes"):
+        table[section]["area"] = {"value": 0.0, "unit": "m2", "source": "its fins are listed: [fins]"}
 
 
 def _scaled(leaf: Leaf, factor: float | None, added: float, named: str) -> dict[str, Any]:

@@ -37,7 +37,7 @@ from scenarios.quantities import (
 )
 from scenarios.steps import even_times, misfits, run_times
 from subzero.errors import short
-from subzero.files.text_repr import Overview
+from subzero.files.text_repr import Overview, shown
 
 SETPOINT = dict(zip(CONTROLS, (*WINCH[1:], None), strict=True))
 """Control of a winch → the quantity that it follows."""
@@ -276,6 +276,7 @@ def _keep(value: Any, **fields: Any) -> None:
         object.__setattr__(value, name, each)
 
 
+@shown
 @dataclass(frozen=True, kw_only=True)
 class Trial:
     """A vehicle on a cable in water, and its instructions; one of `commands` and `motion` is None.
@@ -411,14 +412,6 @@ class Trial:
         changed: Trial = parameters.with_parameters(self, single)
         changes_made = "".join(f"# changed: {name} = {float(value)!r}\n" for name, value in single.items())
         return replace(changed, text=f"{self.text.rstrip()}\n{changes_made}" if changes_made else self.text)
-
-    def __repr__(self) -> str:
-        """Return the trial in a few lines."""
-        return self._overview().text()
-
-    def _repr_html_(self) -> str:
-        """Return the same for a notebook."""
-        return self._overview().html()
 
     def _overview(self) -> Overview:
         """Return the kind of trial, its duration, its start, and the instructions of the vehicle."""

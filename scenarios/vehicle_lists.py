@@ -16,7 +16,6 @@ from typing import Any
 from subzero.derivative_names import COMPLETE, FIN_NAMES, RACE, parsed
 
 Leaf = Mapping[str, Any]
-Leaves = dict[str, Leaf]
 
 
 @dataclass(frozen=True)
@@ -120,7 +119,7 @@ LISTED = re.compile(rf"(?P<section>{'|'.join(TABLES)})\.(?P<name>[^.]+)\.(?P<key
 DERIVATIVES = "derivatives."
 
 
-def optional_leaves(given: Mapping[str, Leaf]) -> Leaves:
+def optional_leaves(given: Mapping[str, Leaf]) -> dict[str, Leaf]:
     """Return the pattern of the sections that a vehicle need not have, as far as a file has them.
 
     Args:
@@ -128,13 +127,13 @@ def optional_leaves(given: Mapping[str, Leaf]) -> Leaves:
     """
     found = [match for match in map(LISTED.fullmatch, given) if match]
     rows = dict.fromkeys((match["section"], match["name"]) for match in found)
-    listed: Leaves = {
+    listed: dict[str, Leaf] = {
         f"{section}.{name}.{key}": {"unit": unit}
         for section, name in rows
         for key, unit in TABLES[section].units.items()
     }
     whole = {"flow_axes": FLOW_AXES, **FURTHER}
-    further: Leaves = {
+    further: dict[str, Leaf] = {
         f"{section}.{key}": {"unit": unit}
         for section, units in whole.items()
         if any(key.startswith(f"{section}.") for key in given)

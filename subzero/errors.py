@@ -164,10 +164,10 @@ NEAR_LIKENESS = 0.5
 """A word that is less like another one was not meant for it, on `difflib`'s scale from 0 to 1."""
 
 
-def nearest(word: str, allowed: Iterable[str], count: int = 1, likeness: float = NEAR_LIKENESS) -> list[str]:
-    """Return the allowed words most like `word` (case does not matter), best first; none if none is near."""
+def nearest(word: str, allowed: Iterable[str], likeness: float = NEAR_LIKENESS) -> list[str]:
+    """Return the allowed word most like `word` (case does not matter) in a list, an empty one if none is near."""
     by_lower = {candidate.lower(): candidate for candidate in allowed}
-    close = difflib.get_close_matches(word.lower()[:80], by_lower, n=count, cutoff=likeness)
+    close = difflib.get_close_matches(word.lower()[:80], by_lower, n=1, cutoff=likeness)
     return [by_lower[match] for match in close]
 
 

@@ -44,18 +44,18 @@ def section_problems(sections: tuple[tuple[str, HullSection], ...]) -> list[Prob
     return []
 
 
-def strips_of(sections: tuple[HullSection, ...], density: float, count: int = STRIPS) -> np.ndarray:
-    """Return (3, count) equal strips between the first and the last section, aft to forward.
+def strips_of(sections: tuple[HullSection, ...], density: float) -> np.ndarray:
+    """Return (3, STRIPS) equal strips between the first and the last section, aft to forward.
 
     Rows: middle x [m], ½ρ C_y h dx and ½ρ C_z b dx [kg/m]; zeros for fewer than two sections.
     """
-    strips = np.zeros((3, count))
+    strips = np.zeros((3, STRIPS))
     if len(sections) < 2:
         return strips
     ordered = sorted(sections, key=lambda section: section.x)
     x = np.array([section.x for section in ordered])
-    step = (x[-1] - x[0]) / count
-    strips[0] = x[0] + step * (np.arange(count) + 0.5)
+    step = (x[-1] - x[0]) / STRIPS
+    strips[0] = x[0] + step * (np.arange(STRIPS) + 0.5)
     side = [section.lateral_drag_coefficient * section.height for section in ordered]
     below = [section.vertical_drag_coefficient * section.breadth for section in ordered]
     for row, widths in ((1, side), (2, below)):

@@ -4,9 +4,9 @@
     tail   R = D/2 − (3D/(2c²) − tan θ/c) s² + (D/c³ − tan θ/c²) s³,   s from its start, c its length
                                                                         (Myring 1976)
 
-The derived numbers in a vehicle's file that call themselves a geometry formula are made by these functions (a
-test compares them). They are plain numpy, run when a vehicle is designed and never inside a simulation,
-except for the radius of the cross-flow strips.
+The derived numbers in a vehicle's file that call themselves a geometry formula are made by these functions, those of
+its fins by the ones of `tests/hull/test_parameters.py`, which compares them all. They are plain numpy, run when a
+vehicle is designed and never inside a simulation, except for the radius of the cross-flow strips.
 """
 
 from __future__ import annotations
@@ -117,20 +117,6 @@ def homogeneous_inertia(hull: Hull, density: float) -> tuple[float, float]:
     )
 
 
-def wetted_area(hull: Hull) -> float:
-    """Area of the skin [m2]."""
-    x, step = stations(hull)
-    radius = hull_radius(hull, x)
-    slope = np.gradient(radius, x)
-    return float(np.sum(2.0 * math.pi * radius * np.sqrt(1.0 + slope**2)) * step)
-
-
-def planform_area(hull: Hull) -> float:
-    """Area of the shadow of the hull [m2]."""
-    x, step = stations(hull)
-    return float(np.sum(2.0 * hull_radius(hull, x)) * step)
-
-
 def lamb_factors(slenderness: float) -> LambFactors:
     """Return Lamb's factors of a prolate spheroid, length over diameter above 1 (Lamb 1932, section 114)."""
     squared = (1.0 / slenderness) ** 2  # 1 − e²: as that difference it would be lost of a thread
@@ -150,21 +136,3 @@ def lateral_added_mass(hull: Hull, density: float) -> tuple[float, float, float]
     factors = lamb_factors(hull.length / hull.diameter)
     sums = (float(np.sum(strip)), float(np.sum(x * strip)), float(np.sum(x**2 * strip)))
     return factors.k2 * sums[0], factors.k2 * sums[1], factors.k_prime * sums[2]
-
-
-def fin_added_mass(hull: Hull, density: float, station: float, chord: float, tip: float) -> tuple[float, ...]:
-    """Return the parts of a pair of fins in A22 [kg], A26 [kg m], A66 [kg m2], and of four of them in A44 [kg m2].
-
-    A slice of hull radius R with a pair of fins up to the radius a_f moves πρ(a_f² − R² + R⁴/a_f²) sideways
-    (Blevins, in Prestero 2001), where the bare hull has πρR²; four fins add (2/π)ρ a_f⁴ about the axis.
-    """
-    x = station + chord * (np.arange(200) + 0.5) / 200 - 0.5 * chord
-    R2 = hull_radius(hull, x) ** 2
-    strip = math.pi * density * (tip**2 - 2.0 * R2 + R2**2 / tip**2) * chord / 200
-    roll = 2.0 / math.pi * density * tip**4 * chord
-    return float(np.sum(strip)), float(np.sum(x * strip)), float(np.sum(x**2 * strip)), roll
-
-
-def whicker_fehlner(aspect_ratio: float) -> float:
-    """Lift slope of an unswept fin [1/rad] (Whicker and Fehlner, DTMB 933)."""
-    return 1.8 * math.pi * aspect_ratio / (math.sqrt(aspect_ratio**2 + 4.0) + 1.8)

@@ -126,10 +126,8 @@ def list_problems(vehicle: Vehicle) -> list[Problem]:
             why, allowed = "this is no such part", f"pairs of a name and a {kind.__module__}.{kind.__name__}"
             return [Problem(key=section, found=short(rows), why=why, allowed=allowed)]
         if len(rows) > most:
-            found, why = (
-                f"{len(rows)} {section.replace('_', ' ')}",
-                "that is more than the compiled equations hold",
-            )
+            found = f"{len(rows)} {section.replace('_', ' ')}"
+            why = "that is more than the compiled equations hold"
             problems.append(Problem(key=section, found=found, why=why, allowed=f"up to {most}"))
     problems += [
         Problem(
@@ -161,9 +159,7 @@ def _channel_problems(names: list[str]) -> list[Problem]:
             why, allowed = "another command has this name", "a name of its own for each actuator"
             problems.append(Problem(key=name, found="this actuator", why=why, allowed=allowed))
     if len(names) > MOST_CHANNELS:
-        found, why = (
-            f"{len(names)} commands of listed actuators",
-            "that is more than the compiled equations hold",
-        )
+        found = f"{len(names)} commands of listed actuators"
+        why = "that is more than the compiled equations hold"
         problems.append(Problem(key="channels", found=found, why=why, allowed=f"up to {MOST_CHANNELS}"))
     return problems

@@ -79,10 +79,8 @@ def product_problems(derivatives: Derivatives, fins: Sequence[str], race: Race |
         return [Problem(key=RACE, found=short(race), why="this is no such part", allowed="a Race, or None")]
     count = count_of(derivatives.derivatives)
     if count > MOST_PRODUCTS:
-        why, allowed = (
-            "that is more than the compiled equations hold",
-            f"up to {MOST_PRODUCTS}, besides those of a single velocity",
-        )
+        why = "that is more than the compiled equations hold"
+        allowed = f"up to {MOST_PRODUCTS}, besides those of a single velocity"
         return [Problem(key="derivatives", found=f"{count} products", why=why, allowed=allowed)]
     used = derivatives.factors
     missing = [name for name in derivatives.named if name in used - {*factor_names(fins)}]

@@ -96,18 +96,15 @@ Handle: Any = Stepped if numba.config.DISABLE_JIT else _Reference
 
 
 @allocating
-def make_handle(
-    line: Line, path: TowPath, led: np.ndarray, record: Record, drum: DrumNumbers, now: np.ndarray,
-    memory: np.ndarray, kept: np.ndarray, water: Water, cable: CableNumbers, work: Load, origin: np.ndarray,
-) -> Any:  # fmt: skip
+def make_handle(stepped: Stepped) -> Any:
     """Return the handle of a tether; `handle_of` makes it safely."""
-    return Handle(line, path, led, record, drum, now, memory, kept, water, cable, work, origin)
+    return Handle(*stepped)
 
 
 def handle_of(stepped: Stepped) -> Any:
     """Return the handle of a tether. No signal breaks in: numba builds it by Python code and dies of an interrupt."""
     with deferred_signals():
-        return make_handle(*stepped)
+        return make_handle(stepped)
 
 
 @allocating

@@ -63,9 +63,7 @@ class CableModes:
     H: np.ndarray
 
     @classmethod
-    def of(
-        cls, model: Model, speed: float, length: float, *, cross_flow: float = 0.0, bends: int = BENDS
-    ) -> CableModes:
+    def of(cls, model: Model, speed: float, length: float, *, cross_flow: float = 0.0) -> CableModes:
         """Return the cable of a model with `length` [m] of it in the water, pulled at `speed` [m/s].
 
         Args:
@@ -73,16 +71,13 @@ class CableModes:
             speed: U, of the tow point through the water. [m/s]
             length: S. [m]
             cross_flow: W, the amplitude of the water's speed across the cable that the drag is linear for. [m/s]
-            bends: K.
         """
-        M, C, K = _matrices(model, speed, length, cross_flow, bends)
+        M, C, K = _matrices(model, speed, length, cross_flow)
         return _state_space(M, C, K, speed, length)
 
 
-def _matrices(
-    model: Model, U: float, S: float, W: float, bends: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return M, C and K of M η'' + C η' + K η = −F e_0 (bends + 1, bends + 1) [N s², N s, N].
+def _matrices(model: Model, U: float, S: float, W: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return M, C and K of M η'' + C η' + K η = −F e_0 (BENDS + 1, BENDS + 1) [N s², N s, N].
 
     With y on the lengthening cable, ∂y/∂t = S η' + U (η − σ η_σ), ∂²y/∂s∂t = η_σ' − (U/S) σ η_σσ and
     ∂²y/∂t² = S η'' + 2U (η' − σ η_σ') + (U²/S) σ² η_σσ.
@@ -90,9 +85,9 @@ def _matrices(
     cable, friction = model.cable, model.drum.friction_torque / model.drum.radius
     m1, drag, c = cable.virtual_mass_per_length, cable.tangential_drag, HARMONIC * cable.normal_drag * W
     added = cable.water_density * cable.cross_section_area
-    node, weight = np.polynomial.legendre.leggauss(bends + 30)  # the last decimetres are steep
+    node, weight = np.polynomial.legendre.leggauss(BENDS + 30)  # the last decimetres are steep
     sigma, weight = 0.5 * (node + 1.0), 0.5 * weight
-    f, g, h = (np.array([shape.deriv(n)(sigma) for shape in _shapes(bends)]) for n in (0, 1, 2))
+    f, g, h = (np.array([shape.deriv(n)(sigma) for shape in _shapes()]) for n in (0, 1, 2))
 
     def integral(left: np.ndarray, right: np.ndarray, by: np.ndarray | float = 1.0) -> np.ndarray:
         rates: np.ndarray = (left * (weight * by)) @ right.T
@@ -109,10 +104,10 @@ def _matrices(
     return M, C, K
 
 
-def _shapes(bends: int) -> list[Polynomial]:
+def _shapes() -> list[Polynomial]:
     """Return 1 − σ and the φ_k as polynomials of σ on [0, 1]."""
     straight, sigma = Polynomial([1.0, -1.0]), Polynomial([0.0, 1.0])
-    legendre = [Legendre.basis(k, domain=[0.0, 1.0]).convert(kind=Polynomial) for k in range(bends)]
+    legendre = [Legendre.basis(k, domain=[0.0, 1.0]).convert(kind=Polynomial) for k in range(BENDS)]
     return [straight, *(sigma * straight * each for each in legendre)]
 
 

@@ -109,9 +109,11 @@ def zigzag(
     }
 
 
-def step_response(
-    time: np.ndarray, values: np.ndarray, goal: float, start: float, band: float = 0.05
-) -> dict[str, float]:
+SETTLED = 0.05
+"""Share of a step within which it has settled. [-]"""
+
+
+def step_response(time: np.ndarray, values: np.ndarray, goal: float, start: float) -> dict[str, float]:
     """Return rise_time_s (10 to 90 %), overshoot (share of the step), settling_time_s and steady_error of a step.
 
     Args:
@@ -119,14 +121,13 @@ def step_response(
         values: the stepped quantity (n,).
         goal: where to.
         start: when. [s]
-        band: share of the step within which it has settled.
 
     The steady error, in the unit of the values, is the mean over the last tenth of the time after the step.
     """
     first = float(np.interp(start, time, values))
     share = (values - first) / (goal - first)
     after = time >= start
-    beyond = np.flatnonzero(after & (np.abs(share - 1.0) > band))
+    beyond = np.flatnonzero(after & (np.abs(share - 1.0) > SETTLED))
     settled = float(time[min(beyond[-1] + 1, time.size - 1)]) - start if beyond.size else 0.0
     late = time >= time[-1] - 0.1 * (time[-1] - start)
     return {

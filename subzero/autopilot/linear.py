@@ -165,11 +165,9 @@ def _tethered_rate(model: Model, steady: Trim, cross_flow: float) -> Rate:
     The tow point moves with V = R(ν + ω × r_c) and is accelerated by R(ν' + ω' × r_c + ω × (ν + ω × r_c)), both split
     along the way and to its two sides; what of the cable's force goes with ν' is mass that the hull takes along.
     """
-    hull, pull, way = (
-        ideal(model.vehicle).numbers(),
-        SteadyPull.of(model, steady.wet_length),
-        _way(model, steady),
-    )
+    hull = ideal(model.vehicle).numbers()
+    pull = SteadyPull.of(model, steady.wet_length)
+    way = _way(model, steady)
     extra = steady.wrench - pull.wrench(steady.state[VELOCITY])
     lever = np.hstack([np.eye(3), -skew(pull.tow_point)])
     speed = float(np.linalg.norm(lever @ steady.state[VELOCITY]))
@@ -261,10 +259,6 @@ def _rows(names: tuple[str, ...], port: str, mixed: tuple[str, str]) -> dict[str
 def _spread(row: np.ndarray) -> np.ndarray:
     """Return the change of the signals when the one that `row` reads moves by one and its opposite does not move."""
     return row / float(row @ row)
-
-
-if TYPE_CHECKING:
-    import control
 
 
 class Mode(NamedTuple):

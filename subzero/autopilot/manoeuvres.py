@@ -88,21 +88,13 @@ class Program(ABC):
             raise UserError(f"at t = {now.time:g} s the {channel} is not a number: no sensor measures it.")
         return float(change)
 
-    def with_rudder(self, angle: float) -> Command:
-        """Return the straight command with a rudder [rad]."""
-        return self.helm.command(rudder=angle)
-
-    def with_planes(self, angle: float) -> Command:
-        """Return the straight command with both planes moved [rad]."""
-        return self.helm.command(planes=angle)
-
 
 class TurningCircle(Program):
     """The rudder put over, and kept."""
 
     def after(self, now: Observation, started: Observation) -> Command:
         """Return the rudder over."""
-        return self.with_rudder(self.size)
+        return self.helm.command(rudder=self.size)
 
 
 class ZigZag(Program):
@@ -112,7 +104,7 @@ class ZigZag(Program):
         """Return the rudder on its present side."""
         if self.turned("heading", now, started) >= abs(self.size):
             self.side = -self.side
-        return self.with_rudder(self.side * self.size)
+        return self.helm.command(rudder=self.side * self.size)
 
 
 class VerticalZigZag(Program):
@@ -122,28 +114,11 @@ class VerticalZigZag(Program):
         """Return the planes on their present side."""
         if self.turned("pitch", now, started) >= abs(self.size):
             self.side = -self.side
-        return self.with_planes(self.side * self.size)
+        return self.helm.command(planes=self.side * self.size)
 
 
-SPIRAL_SHARES = (
-    1.0,
-    0.5,
-    0.25,
-    0.1,
-    0.0,
-    -0.1,
-    -0.25,
-    -0.5,
-    -1.0,
-    -0.5,
-    -0.25,
-    -0.1,
-    0.0,
-    0.1,
-    0.25,
-    0.5,
-    1.0,
-)
+TO_THE_OTHER_SIDE = (1.0, 0.5, 0.25, 0.1, 0.0, -0.1, -0.25, -0.5, -1.0)
+SPIRAL_SHARES = TO_THE_OTHER_SIDE + TO_THE_OTHER_SIDE[-2::-1]
 SPIRAL_HOLD = 6.0
 """Rudders of a spiral, as shares of the largest, and how long each is held [s]."""
 
@@ -154,7 +129,7 @@ class Spiral(Program):
     def after(self, now: Observation, started: Observation) -> Command:
         """Return the rudder of the present step."""
         step = int((now.time - started.time + 1e-9) / SPIRAL_HOLD)
-        return self.with_rudder(self.size * SPIRAL_SHARES[min(step, len(SPIRAL_SHARES) - 1)])
+        return self.helm.command(rudder=self.size * SPIRAL_SHARES[min(step, len(SPIRAL_SHARES) - 1)])
 
 
 class CrashStop(Program):

@@ -84,9 +84,6 @@ def margins(loop: control.StateSpace, *, delay: float = 0.0) -> Margins:
     )
 
 
-if TYPE_CHECKING:
-    import control
-
 MARGINAL = 1e-6
 """A motion that grows by less than this per sample counts as constant, as the depth in the pitch loop does."""
 
@@ -175,10 +172,8 @@ def _opened(
     part = subsystem(linear, WEIGHTS[loop].part)
     sampled = control.c2d(part, sample_time)
     if estimates is not None and loop == "heading":
-        controller, rows = (
-            _estimator(estimates, speed, sample_time),
-            [STATES.index(name) for name in STATES[1:3]],
-        )
+        controller = _estimator(estimates, speed, sample_time)
+        rows = [STATES.index(name) for name in STATES[1:3]]
     else:
         controller = _pid(tuning.gains[loop].at(speed), sample_time)
         rows = [part.state_labels.index(name) for name in WEIGHTS[loop].measured]

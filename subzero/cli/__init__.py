@@ -2,8 +2,9 @@
 
 app                 `main`; simulate, compare, plot, explore
 trials              list, show, new
-install             doctor, warm, completion, clean
+install             doctor, warm, completion
 import_log          import
+cables              export-fmu, import-line
 autopilot           manoeuvre, autopilot                     write_flights        their files
 sweep               sweep                                    write_sweep          its files
 diagnosis           diagnose, calibrate, challenge           write_diagnosis, write_calibration
@@ -12,5 +13,4 @@ examples            example lines of each command's help
 output_mode         --quiet, --json, --verbose
 progress            progress bars, also into a pipe
 interrupts          Ctrl-C and SIGTERM
-standard_streams    closed and full pipes
 """

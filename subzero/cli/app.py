@@ -1,6 +1,6 @@
 """The command line: ``subzero simulate``, ``compare``, ``plot``, ``explore``; ``list``, ``new``, ``show``, ``validate``
 (`trials`); ``manoeuvre``, ``autopilot`` (`autopilot`); ``import`` (`import_log`);
-``export-fmu`` (`export_fmu`); ``import-line`` (`import_line`);
+``export-fmu``, ``import-line`` (`cables`);
 ``diagnose``, ``calibrate``,
 ``challenge`` (`diagnosis`); ``sweep`` (`sweep`); ``doctor``, ``warm``, ``completion`` (`install`).
 
@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,7 +26,7 @@ import cyclopts
 from cyclopts import Parameter
 
 import scenarios
-from subzero.cli import autopilot, diagnosis, export_fmu, import_line, import_log, install, sweep, trials
+from subzero.cli import autopilot, cables, diagnosis, import_log, install, sweep, trials
 from subzero.cli.examples import EXAMPLES, register
 from subzero.cli.interrupts import INTERRUPTED, print_interrupted, reset, was_interrupted
 from subzero.cli.output_mode import COMMAND, NOT_STRICT, PLAIN, OutputMode, StrictOutputMode, set_output_mode
@@ -53,18 +53,20 @@ class Outputs:
     """Which files are made, and how.
 
     Attributes:
+        check: run it once more with half the steps and half the segment length, and say what changes.
         export: further files, for other programs: mcap, mat, parquet or cf; more than one may be given.
         width: of the figures in inches: 7.2 for two columns of a journal page, 3.4 for one.
         figures: png, svg or pdf.
         animate: film the replay of report.html as a gif or an mp4; needs Chromium and the extra [animate].
     """
 
+    check: Flag = False
     export: Export = ()
     width: float | None = None
     figures: Literal["png", "svg", "pdf"] = "png"
     animate: Literal["gif", "mp4"] | None = None
 
-    def check(self) -> None:
+    def refuse_impossible(self) -> None:
         """Raise an error for outputs that cannot be made, before anything is simulated."""
         from subzero.cli.write_results import check_pictures
 
@@ -197,7 +199,6 @@ def simulate(
     untethered: Annotated[bool, Parameter(negative=())] = False,
     inputs: Inputs = NO_INPUTS,
     kept: Kept = ALL_KEPT,
-    check: Flag = False,
     outputs: Outputs = USUAL_OUTPUTS,
     output_mode: StrictOutputMode = NOT_STRICT,
 ) -> int:
@@ -208,34 +209,18 @@ def simulate(
         untethered: leave the cable away.
         inputs: inputs of the simulation besides the scenario.
         kept: results to keep, and where.
-        check: run it once more with half the steps and half the segment length, and say what changes.
         outputs: which files are made, and how.
         output_mode: the form of the output.
     """
-    from subzero.cli import write_results
-    from subzero.results.netcdf_csv import open_output_folder
-
     trial = inputs.read(scenario)
-    outputs.check()
-    folder = kept.folder(kept.of(trial))
-    with kept.kept_in(folder) as checkpoint, open_output_folder(folder) as output_folder:
-        trial, extended = inputs.checked(scenario)
-        trial = kept.of(trial)
-        with _progress(trial) as progress:
-            from subzero.simulation.run import simulate as run
 
-            result = run(trial, tethered=not untethered, **extended, **checkpoint, progress=progress)
-        runs = {"untethered" if untethered else "tethered": result}
-        runs = _refined(runs, trial, extended) if check else runs
-        summary = write_results.write_all(runs, None, output_folder, **outputs.kinds(), float64=kept.float64)
-        write_results.write_film(outputs.animate, output_folder)
-    return (
-        FINE
-        if write_results.print_results(
-            summary, output_folder, strict=output_mode.strict, output_mode=output_mode
-        )
-        else STOPPED
-    )
+    def run(trial: scenarios.Trial, **how: Any) -> tuple[Runs, None]:
+        from subzero.simulation.run import simulate
+
+        made = simulate(trial, tethered=not untethered, **how)
+        return {"untethered" if untethered else "tethered": made}, None
+
+    return _deliver(scenario, trial, run, inputs, kept, outputs, output_mode)
 
 
 def compare(
@@ -246,7 +231,6 @@ def compare(
     map: Path | None = None,
     inputs: Inputs = NO_INPUTS,
     kept: Kept = ALL_KEPT,
-    check: Flag = False,
     outputs: Outputs = USUAL_OUTPUTS,
     output_mode: StrictOutputMode = NOT_STRICT,
 ) -> int:
@@ -258,36 +242,50 @@ def compare(
         map: the measured file is a log as its logger wrote it, with this map of "subzero import".
         inputs: inputs of the simulation besides the scenario.
         kept: results to keep, and where.
-        check: run both once more with half the steps and half the segment length, and say what changes.
         outputs: which files are made, and how.
         output_mode: the form of the output.
     """
+    trial = inputs.read(scenario)
+    record = _measured(measured, map)
+
+    def run(trial: scenarios.Trial, **how: Any) -> tuple[Runs, Record | None]:
+        from subzero.simulation.comparison import compare
+
+        result = compare(trial, measured=record, **how)
+        return result.runs, result.measured
+
+    return _deliver(scenario, trial, run, inputs, kept, outputs, output_mode)
+
+
+def _deliver(
+    scenario: str,
+    trial: scenarios.Trial,
+    run: Callable[..., tuple[Runs, Record | None]],
+    inputs: Inputs,
+    kept: Kept,
+    outputs: Outputs,
+    output_mode: StrictOutputMode,
+) -> int:
+    """Run a trial that was read without its vehicle's own check, write and print the results; return the exit code."""
     from subzero.cli import write_results
     from subzero.results.netcdf_csv import open_output_folder
 
-    trial = inputs.read(scenario)
-    record = _measured(measured, map)
-    outputs.check()
+    outputs.refuse_impossible()
     folder = kept.folder(kept.of(trial))
     with kept.kept_in(folder) as checkpoint, open_output_folder(folder) as output_folder:
         trial, extended = inputs.checked(scenario)
         trial = kept.of(trial)
         with _progress(trial) as progress:
-            from subzero.simulation.comparison import compare as run
-
-            result = run(trial, measured=record, **extended, **checkpoint, progress=progress)
-        runs = _refined(result.runs, trial, extended) if check else result.runs
+            runs, record = run(trial, **extended, **checkpoint, progress=progress)
+        runs = _refined(runs, trial, extended) if outputs.check else runs
         summary = write_results.write_all(
-            runs, result.measured, output_folder, **outputs.kinds(), float64=kept.float64
+            runs, record, output_folder, **outputs.kinds(), float64=kept.float64
         )
         write_results.write_film(outputs.animate, output_folder)
-    return (
-        FINE
-        if write_results.print_results(
-            summary, output_folder, strict=output_mode.strict, output_mode=output_mode
-        )
-        else STOPPED
+    is_well = write_results.print_results(
+        summary, output_folder, strict=output_mode.strict, output_mode=output_mode
     )
+    return FINE if is_well else STOPPED
 
 
 def _measured(path: Path | None, map: Path | None) -> Record | None:
@@ -379,7 +377,7 @@ def explore(
 trials.add_to(app)
 for _command in (simulate, compare, plot, explore):
     register(app, _command)
-for _module in (autopilot, import_log, diagnosis, sweep, export_fmu, import_line, install):
+for _module in (autopilot, import_log, diagnosis, sweep, cables, install):
     _module.add_to(app)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 import textwrap
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,9 +14,11 @@ import cyclopts
 from cyclopts import Parameter
 
 import scenarios
+from scenarios.errors import Problem, ScenarioError, nearest_or_all
+from scenarios.quantities import KNOWN
 from subzero.cli.examples import register
 from subzero.cli.output_mode import PLAIN, OutputMode
-from subzero.errors import UserError, printable, short
+from subzero.errors import UserError, printable, real, short
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -28,6 +30,26 @@ Words = Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative=())
 FINE = 0
 COMMANDS_COLUMN = "propeller_rps"
 """A CSV file with this column holds commands; any other is a measured record."""
+FEW_NUMBERS = """
+# {title}
+#
+# All other numbers follow from {base} by similarity: "subzero show" says which are measured, derived and guessed,
+# with the range of each; calibrations and diagnoses take half of a derived range as tolerance.{speed}
+# A number that you know better goes into its own section, as in the file of {base}:
+#
+#   [rudder]
+#   area = {{ value = 0.009, unit = "m2", range = [0.008, 0.010], source = "measured" }}
+
+base = "{base}"
+
+[known]{rows}
+
+# What else can be known, without the # in front:
+{rest}
+"""
+"""A vehicle file of few numbers: the known ones, and others that could be given, explained. What follows from it is
+`scenarios.similar_vehicle`.
+"""
 
 
 def list_shipped(*, vehicles: Flag = False, cables: Flag = False, output_mode: OutputMode = PLAIN) -> int:
@@ -96,19 +118,18 @@ def new(
 def _new_torpedo(path: Path, words: list[str], output_mode: OutputMode) -> int:
     """Write a vehicle of few numbers, once it is known that they make one."""
     from scenarios.contents import contents_of_text
-    from scenarios.few_numbers import file_text, known_numbers
     from scenarios.similar_vehicle import speed_command
     from subzero.files.read_file import make_toml
 
-    known = known_numbers(words)
-    found = contents_of_text("vehicle", str(path), file_text("torpedo", known, "A vehicle."))
+    known = _known_numbers(words)
+    found = contents_of_text("vehicle", str(path), _file_text("torpedo", known, "A vehicle."))
     doubts = _doubts(found)
     numbers = {number.name.removeprefix("vehicle."): number.values[0] for number in found.numbers}
     speed = known.get("speed_m_s")
     command = speed_command(lambda key: numbers.get(key, 0.0), speed) if speed else None
     sentence = f"It goes {speed:g} m/s at {command:.1f} rev/s." if command else ""
     title = f"{path.stem}: a torpedo of {len(known)} known numbers."
-    make_toml(path, file_text("torpedo", known, title, sentence))
+    make_toml(path, _file_text("torpedo", known, title, sentence))
     reported = {"path": printable(str(path)), "kind": "vehicle", "like": "torpedo", "known": known}
     with output_mode.emit(reported | {"propeller_rps": command, "warnings": doubts}):
         print(f"Wrote {reported['path']}: a torpedo of {len(known)} known numbers. {sentence}".rstrip())
@@ -116,6 +137,64 @@ def _new_torpedo(path: Path, words: list[str], output_mode: OutputMode) -> int:
         print(f"  subzero show {reported['path']}")
         print(f"  subzero manoeuvre zigzag --vehicle {reported['path']}")
     return FINE
+
+
+def _file_text(base: str, known: Mapping[str, float], title: str, speed: str = "") -> str:
+    """Return a vehicle file of few numbers, explained.
+
+    Args:
+        base: a shipped vehicle.
+        known: key of [known] → value.
+        title: its first line.
+        speed: a sentence about its speed and command.
+    """
+    rows = {q.name: f"{q.name} = {{value}}# {q.meaning} [{q.unit}]" for q in KNOWN}
+    said = "".join("\n" + rows[key].format(value=f"{value:<12g}") for key, value in known.items())
+    rest = "\n".join("# " + rows[key].format(value="...  ") for key in rows if key not in known)
+    return (
+        FEW_NUMBERS.strip()
+        .format(base=base, rows=said, rest=rest, title=title, speed=f"\n# {speed}" if speed else "")
+        .replace(". \n", ".\n")
+        + "\n"
+    )
+
+
+def _known_numbers(words: list[str]) -> dict[str, float]:
+    """Return key of [known] → value for words such as ``length=2.0``; the unit of the key may be left out.
+
+    Raises:
+        ScenarioError: a word that is none, a key that is not known, a value outside its limits.
+    """
+    rows = {quantity.name: quantity for quantity in KNOWN}
+    short = {name.removesuffix(f"_{name.rsplit('_', 1)[1]}"): name for name in rows}
+    short |= {"speed": "speed_m_s", "fin_area": "fin_area_m2", "water_density": "water_density_kg_m3"}
+    found: dict[str, float] = {}
+    problems = []
+    for word in words:
+        name, _, text = word.partition("=")
+        key, number = short.get(name, name), _float(text)
+        if key not in rows:
+            why = "no such number is known of a vehicle" if text else "this is not name=value"
+            remedy = nearest_or_all(name, [*short])
+            problems.append(Problem(file="the command", key=name, why=why, remedy=remedy))
+        elif number is None or not rows[key].low <= number <= rows[key].high:
+            problems.append(
+                Problem(
+                    file="the command", key=name, found=text, why="this cannot be", remedy=rows[key].allowed
+                )
+            )
+        else:
+            found[key] = number
+    if problems:
+        raise ScenarioError(problems)
+    return found
+
+
+def _float(text: str) -> float | None:
+    try:
+        return real(float(text))
+    except ValueError:
+        return None
 
 
 def show(name: str, /, *, output_mode: OutputMode = PLAIN) -> int:

@@ -47,11 +47,9 @@ LAYOUT = {
     "arc_length": ("f", ("time", "node")),
 }
 """Variable of more than time → kind and dimensions; channels have the dimension time alone."""
-TEXTS, TABLES, NUMBERS = (
-    ("scenario", "title", "outcome", "outcome_message"),
-    ("parameters", "versions", "warnings", "accuracy"),
-    ("tethered", "prescribed"),
-)
+TEXTS = ("scenario", "title", "outcome", "outcome_message")
+TABLES = ("parameters", "versions", "warnings", "accuracy")
+NUMBERS = ("tethered", "prescribed")
 """Attributes of a run: words, words in JSON, numbers."""
 
 

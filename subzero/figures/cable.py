@@ -285,13 +285,12 @@ def _tracks(run: xr.Dataset, axes: Axes) -> None:
     in_scale(axes)
 
 
-def shape_3d(run: xr.Dataset, title: Title, count: int = SHAPES) -> Figure:
+def shape_3d(run: xr.Dataset, title: Title) -> Figure:
     """Draw the cable at some times in space, tow point and drum, and the way of the tow point; down is down.
 
     Args:
         run: a run with a cable; of another, the track of the hull alone is drawn.
         title: the title above it.
-        count: how many shapes, spread over the run.
     """
     figure = Figure(figsize=(SIDE, SIDE), dpi=style.DPI, facecolor="white")
     FigureCanvasAgg(figure)
@@ -309,7 +308,7 @@ def shape_3d(run: xr.Dataset, title: Title, count: int = SHAPES) -> Figure:
         label=f"way of the {'tow point' if has_cable else 'hull'}",
     )
     if has_cable:
-        _shapes_in_space(run, axes, count)
+        _shapes_in_space(run, axes)
         axes.plot(*drum_direction(run)[-1:].T, "s", color=style.INK, markersize=4.5, label="drum")
     names = axes_of(run) if has_cable else ("north", "east", "depth")
     for set_label, name in zip((axes.set_xlabel, axes.set_ylabel, axes.set_zlabel), names, strict=True):
@@ -324,9 +323,9 @@ def shape_3d(run: xr.Dataset, title: Title, count: int = SHAPES) -> Figure:
     return figure
 
 
-def _shapes_in_space(run: xr.Dataset, axes: Any, count: int) -> None:
+def _shapes_in_space(run: xr.Dataset, axes: Any) -> None:
     """Draw the cable at some times, with a dot at the tow point."""
-    times = spread(count, run.sizes["time"])
+    times = spread(SHAPES, run.sizes["time"])
     for at, share in zip(times, np.linspace(0.0, 0.85, len(times)), strict=True):
         place, colour = run["cable_position"].values[at], colormaps["viridis"](share)
         axes.plot(*place.T, color=colour, linewidth=1.4, label=f"{run['time'].values[at]:.3g} s")

@@ -112,9 +112,9 @@ def state_of_output() -> str:
     return f"all files were written to {printable(str(_delivered[-1]))}"
 
 
-def remove_temporary(wait: float = MOVING_S) -> None:
+def remove_temporary() -> None:
     """Remove the temporary folders of this process, for one that is about to end while its main thread still works."""
-    if _moving.acquire(timeout=wait):  # for good: nothing moves any more
+    if _moving.acquire(timeout=MOVING_S):  # for good: nothing moves any more
         for root in tuple(_temporary):
             _remove(root)
 

@@ -109,10 +109,8 @@ def _begin(path: str | Path, count: int) -> bytes:
         why, remedy = f"it cannot be read ({reason})", "Name a file that you may read."
         raise UnreadableFileError(str(path), why, remedy) from None
     if data is None:
-        why, remedy = (
-            "this is a device, a pipe or a socket, not a file",
-            "Save what it gives to a file first.",
-        )
+        why = "this is a device, a pipe or a socket, not a file"
+        remedy = "Save what it gives to a file first."
         raise UnreadableFileError(str(path), why, remedy)
     _refuse_half_written(Path(path))
     return data

@@ -1,6 +1,6 @@
 """A value in a few lines: what a prompt shows (`repr`) and a notebook (`_repr_html_`).
 
-A class gives its title and rows of cells as an `Overview`, and inherits nothing.
+A class gives its title and rows of cells as an `Overview`, is marked as `shown`, and inherits nothing.
 
 >>> print(Overview("A cable", [("length", "25.6 m"), ("tension", "0.72 N", "at 30 s")]).text())
 A cable
@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 from itertools import zip_longest
-from typing import NamedTuple
+from typing import NamedTuple, Protocol, TypeVar
 
 from subzero.errors import printable
 
@@ -54,6 +54,31 @@ class Overview(NamedTuple):
             return self.rows
         kept = self.rows[: MOST_LINES - 2]
         return [*kept, ("…", f"{len(self.rows) - len(kept)} more")]
+
+
+class HasOverview(Protocol):
+    """A value that has an overview."""
+
+    def _overview(self) -> Overview: ...
+
+
+Class = TypeVar("Class", bound=type[HasOverview])
+
+
+def shown(kind: Class) -> Class:
+    """Let a prompt and a notebook show the overview of a class."""
+
+    def text(self: HasOverview) -> str:
+        """Return what one reads first, in a few lines."""
+        return self._overview().text()
+
+    def html(self: HasOverview) -> str:
+        """Return the same for a notebook."""
+        return self._overview().html()
+
+    for name, method in (("__repr__", text), ("_repr_html_", html)):
+        setattr(kind, name, method)
+    return kind
 
 
 def cut(text: str) -> str:

@@ -209,10 +209,8 @@ def _values(table: Table, mapping: Map, rows: np.ndarray) -> tuple[dict[str, np.
         notes.append("North and east are metres from the first place, on the ellipsoid WGS 84.")
     if PRESSURE in lines:
         notes.append("Depth is by pressure, in sea water of 1025 kg/m³; an absolute one less 1013.25 hPa.")
-        absolute, least = (
-            f"{lines[PRESSURE].unit} absolute",
-            np.nanmin(values[TARGETS[PRESSURE]], initial=AIR_M[1]),
-        )
+        absolute = f"{lines[PRESSURE].unit} absolute"
+        least = np.nanmin(values[TARGETS[PRESSURE]], initial=AIR_M[1])
         if absolute in UNITS[PRESSURE] and AIR_M[0] < least < AIR_M[1]:
             notes.append(
                 f"The least pressure is that of air: if it is absolute, say so in a map: unit = {absolute!r}."

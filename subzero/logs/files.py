@@ -299,10 +299,8 @@ def _rosbag(path: Path, wanted: Wanted, notes: Notes) -> Iterator[Sample]:
 def _of_ros(topic: str, message: Any, at: float, wanted: Wanted, notes: Notes) -> Iterator[Sample]:
     """Give the numbers in a message, ``field @ topic``, in the axes of a vehicle."""
     frame = str(_parts(_parts(message).get("header")).get("frame_id", ""))
-    is_ned, is_of_body = (
-        "ned" in frame.lower(),
-        "child_frame_id" in _parts(message) or frame not in EARTH_FRAMES,
-    )
+    is_ned = "ned" in frame.lower()
+    is_of_body = "child_frame_id" in _parts(message) or frame not in EARTH_FRAMES
     for name, unit, value, is_turned in _fields("", message, is_ned, is_of_body):
         column = f"{name if name != 'data' else topic.rpartition('/')[2]} @ {topic}"
         if wanted(column, unit):

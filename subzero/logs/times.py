@@ -133,10 +133,8 @@ def unit_by_values(clock: np.ndarray) -> list[str]:
     known = clock[np.isfinite(clock)]
     if not known.size:
         return []
-    steps, middle = (
-        np.diff(known),
-        float(np.median(known)),
-    )  # the first rows may be of a clock that was not set yet
+    steps = np.diff(known)
+    middle = float(np.median(known))  # the first rows may be of a clock that was not set yet
     step = float(np.median(steps[steps > 0.0])) if (steps > 0.0).any() else 0.0
     for least, unit in EPOCHS.items():
         if middle > least and step * CLOCK_UNITS[unit] < LONGEST_STEP_S:

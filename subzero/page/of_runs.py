@@ -25,7 +25,6 @@ def page_of_runs(
     *,
     command: str,
     record: Record | None = None,
-    name: str = "",
 ) -> str:
     """Return ``report.html`` of some runs.
 
@@ -35,13 +34,12 @@ def page_of_runs(
         figures: by name.
         command: the line that makes them again.
         record: the measured record.
-        name: of the command, such as compare; by default the second word of its line.
     """
     first = next(iter(runs.values()))
     labels = [label for label in RUNS if label in summary]
     return render(
         Report(
-            command_name=name or _scenario_word(command),
+            command_name=[*command.split(), "", ""][1],
             scenario=summary["scenario"],
             title=summary["title"],
             version=summary["subzero_version"],
@@ -60,10 +58,6 @@ def _can_be_replayed(run: xr.Dataset) -> bool:
     """Return whether there is anything to replay: at least two samples, of a vehicle whose shape is known."""
     shape = json.loads(run.attrs["parameters"]).get("vehicle", {})
     return run.sizes["time"] > 1 and all(name in shape for name in HULL)
-
-
-def _scenario_word(command: str) -> str:
-    return [*command.split(), "", ""][1]
 
 
 def _outcome(label: str, run: dict[str, Any]) -> list[Line]:

@@ -5,6 +5,17 @@ A record has the column ``time_s`` and any columns of `subzero.channels`, such a
 cannot be used is refused with all its problems at once. A heading that jumps from 360 to 0 degrees is made
 continuous (`scenarios.heading`).
 
+A log that is faster than a sensor fills in what lies between. The sampling model of a channel, decided from its values
+alone, is one of
+
+    fresh          every value is a measurement
+    held           y_k = y_(k−1), but for every m-th row
+    interpolated   y_k = ½ (y_(k−1) + y_(k+1)), but for every m-th row, to the digits that are written
+
+with one m for the whole channel, at least half of whose m-th rows are new. Means over the same rows look like the one
+or the other; a diagnosis leaves open when in its interval a value was measured. Running means, and sensors whose rows
+are not evenly spread, are taken for fresh. So is a rounded sensor that stands still, whose values change at any row.
+
 A heading is known but for whole turns: one compass begins at 359 degrees where another, or a run, begins at −1. So a
 run's heading is counted from its trial's start, without a jump wherever that lies, and a record's from the run's, with
 the turns of its yaw rate, or else of the run.
@@ -27,7 +38,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.heading import TURN, continuous, contradicted, expected, turned
-from scenarios.sampling import measurements_alone
 from subzero.arguments import checked_arguments
 from subzero.channels import BY_COLUMN, BY_NAME, HEADING, TIME
 from subzero.errors import UserError, listed, nearest, printable
@@ -41,6 +51,12 @@ if TYPE_CHECKING:
 YAW_RATE = "yaw_rate"
 """The channel that shows how often a heading has turned."""
 
+SAME = 2e-5
+"""Numbers that differ by less than this share are the same: a log has five digits or more. [-]"""
+FEWEST_MEASURED = 6
+"""Fewer measurements do not show how they were sampled. [-]"""
+NEW_SHARE = 0.5
+"""At least this share of the m-th rows has to be new: commands that step now and then are not held measurements. [-]"""
 GAPS = ("", "nan", "+nan", "-nan")
 """Cells that hold no measurement; numerical libraries write a NaN with either sign."""
 
@@ -148,13 +164,50 @@ def as_measured(record: Record) -> Record:
 
 
 def measured_alone(record: Record) -> Record:
-    """Return a record without the values that a logger filled in between measurements (`scenarios.sampling`)."""
-    values, intervals = measurements_alone(record.time, record.values)
+    """Return a record without the values that a logger filled in between measurements."""
+    values, intervals = _measurements_alone(record.time, record.values)
     if not intervals:
         return record
     words = ", ".join(f"{BY_NAME[name].column} (every {every:.3g} s)" for name, every in intervals.items())
     note = f"Only measurements are used, not what a logger filled in between them: {words}."
     return replace(record, values=values, notes=(*record.notes, note), intervals=intervals)
+
+
+def _sampling_of(values: np.ndarray) -> slice | None:
+    """Return which of the known values of a channel (m,) are measurements; None if all are."""
+    steps = np.abs(np.diff(values))
+    size = np.abs(values)
+    is_new = steps > SAME * np.maximum(size[1:], size[:-1])
+    off_line = np.abs(np.diff(values, 2)) > 2.0 * SAME * np.maximum(size[2:], size[:-2])
+    for new in (is_new, off_line):  # held, interpolated
+        rows = np.flatnonzero(new) + 1
+        every = int(np.gcd.reduce(np.diff(rows))) if rows.size > 1 else 1
+        if every > 1 and rows.size >= max(FEWEST_MEASURED, NEW_SHARE * values.size / every):
+            return slice(rows[0] % every, None, every)
+    return None
+
+
+def _measurements_alone(
+    time: np.ndarray, values: Mapping[str, np.ndarray]
+) -> tuple[dict[str, np.ndarray], dict[str, float]]:
+    """Return the channels (n,) with gaps in place of what was not measured, and the time between two measurements of
+    those that have such gaps. [s]
+
+    Args:
+        time: of the rows (n,). [s]
+        values: channel → values, NaN in gaps (n,).
+    """
+    found, intervals = dict(values), dict[str, float]()
+    for name, column in values.items():
+        known = np.flatnonzero(np.isfinite(column))
+        sampling = _sampling_of(column[known])
+        if sampling is None:
+            continue
+        kept = known[sampling]
+        found[name] = np.full(column.size, np.nan)
+        found[name][kept] = column[kept]
+        intervals[name] = float(np.median(np.diff(time[kept])))
+    return found, intervals
 
 
 def _name(path: str | Path) -> str:

@@ -119,19 +119,26 @@ CHUNK_CACHE = 2**20
 
 
 def write_netcdf(run: xr.Dataset, path: Path, float64: bool = False) -> None:
-    """Write a run as netCDF, its large arrays block by block; its library says a full disk as it says everything else.
+    """Write a run as netCDF, its large arrays block by block.
 
     xarray converts all that it writes before it writes any of it, which takes as much memory as the run itself.
     """
     stored = storage(run, float64=float64)
     large = [name for name, values in run.variables.items() if values.ndim > 1 and name in stored]
     rest = run.drop_vars(large)
-    try:
+    with full_disk_said(path):
         rest.to_netcdf(
             path, engine="netcdf4", encoding={name: stored[name] for name in stored if name in rest.variables}
         )
         _append(run, path, {str(name): stored[str(name)] for name in large})
         append_digest(path)
+
+
+@contextmanager
+def full_disk_said(path: Path) -> Iterator[None]:
+    """Raise the error of a file that cannot be written where the netCDF library says "HDF error"."""
+    try:
+        yield
     except RuntimeError as error:
         if "HDF error" not in str(error):
             raise

@@ -25,7 +25,7 @@ from subzero.arguments import checked_arguments
 from subzero.channels import BY_NAME, CHANNELS, HEADING, UNITS
 from subzero.engine.initial_conditions import Later
 from subzero.errors import UserError
-from subzero.files.text_repr import Overview
+from subzero.files.text_repr import Overview, shown
 from subzero.model import Model, load, model_of
 from subzero.records.record import Fit, Record, fits, measured_alone, modelled, read_record, with_heading_of
 from subzero.results.summary import FORCE, MOMENT, summarise, summary_of
@@ -50,6 +50,7 @@ Progress = Callable[[float], None]
 """Called now and then with the fraction that is done, 0 to 1."""
 
 
+@shown
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
     """A trial, simulated with its cable and without.
@@ -65,14 +66,6 @@ class Comparison:
     untethered: xr.Dataset
     trial: scenarios.Trial
     measured: Record | None = None
-
-    def __repr__(self) -> str:
-        """Return both runs in a few lines."""
-        return self._overview().text()
-
-    def _repr_html_(self) -> str:
-        """Return the same for a notebook."""
-        return self._overview().html()
 
     def _overview(self) -> Overview:
         """Return the numbers that one reads first, one column a run."""

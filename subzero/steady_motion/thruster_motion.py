@@ -11,24 +11,22 @@ out here and looked at afterwards, as of fins (`trim_point`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from math import cos, pi, sin
+from functools import cached_property
+from math import pi
 
 import numpy as np
 
 from subzero.steady_motion.asked import Asked
 from subzero.steady_motion.hull_state_space import (
     CHANNELS,
-    DEPTH,
     HEADING,
     PITCH,
     ROLL,
     VELOCITY,
-    rate,
     resting_state,
 )
-from subzero.steady_motion.steady_pull import SteadyPull
-from vehicle import Vehicle, VehicleNumbers
+from subzero.steady_motion.motion import Motion
+from vehicle import Vehicle
 from vehicle.thrusters import AHEAD, ASTERN, AXES, DEAD_BAND, EXPONENT, Thruster, allocation
 
 LEFT_TO_THE_HULL = (
@@ -87,34 +85,13 @@ def shares_of_wrench(hull: Vehicle, wrench: np.ndarray, free: tuple[str, ...]) -
     return shares
 
 
-@dataclass(frozen=True, kw_only=True)
-class ThrusterMotion:
-    """The requested motion of a hull on thrusters, with which pull beyond the formula's.
+class ThrusterMotion(Motion):
+    """The requested motion of a hull on thrusters."""
 
-    Attributes:
-        asked: which motion.
-        hull: whose thrusters.
-        numbers: of the hull, its actuators without limits.
-        free: axes that its thrusters do not hold: the motion along them is unknown.
-        pull, extra: of the cable, and a part added to it.
-    """
-
-    asked: Asked
-    hull: Vehicle
-    numbers: VehicleNumbers
-    free: tuple[str, ...]
-    pull: SteadyPull
-    extra: np.ndarray
-
-    @classmethod
-    def of(cls, asked: Asked, hull: Vehicle, numbers: VehicleNumbers, pull: SteadyPull) -> ThrusterMotion:
-        """Return the requested motion of a vehicle."""
-        free = unheld(hull) or ()
-        return cls(asked=asked, hull=hull, numbers=numbers, free=free, pull=pull, extra=np.zeros(6))
-
-    def part(self, share: float) -> ThrusterMotion:
-        """Return the same with a share of everything that is not straight and level."""
-        return replace(self, asked=self.asked.part(share), extra=share * self.extra)
+    @cached_property
+    def free(self) -> tuple[str, ...]:
+        """Axes that its thrusters do not hold: the motion along them is unknown."""
+        return unheld(self.hull) or ()
 
     def guess(self) -> np.ndarray:
         """Return the unknowns (7,) to begin with: no thrust, level, sinking as asked."""
@@ -128,19 +105,12 @@ class ThrusterMotion:
         pitch = y[PITCHED] if is_free[PITCHED] else 0.0
         sway = y[SWAY] if is_free[SWAY] else asked.sway_speed
         x[ROLL], x[PITCH], x[HEADING] = roll, pitch, 0.0
-        spin = (-sin(pitch), cos(pitch) * sin(roll), cos(pitch) * cos(roll))
-        x[VELOCITY] = asked.speed, sway, y[6], *(asked.turn_rate * part for part in spin)
+        x[VELOCITY] = self.velocity(roll, pitch, sway, y[6])
         wrench = np.where(is_free, 0.0, y[:6])
         x[CHANNELS.start : CHANNELS.start + len(self.hull.thrusters)] = shares_of_wrench(
             self.hull, wrench, self.free
         )
         return x
-
-    def left(self, y: np.ndarray) -> np.ndarray:
-        """Return the residual of the seven equations."""
-        x = self.state(y)
-        rates = rate(x, x[12:], self.numbers, self.pull.wrench(x[VELOCITY]) + self.extra)
-        return np.append(rates[VELOCITY], rates[DEPTH] - self.asked.depth_rate)
 
     def is_near(self, y: np.ndarray) -> bool:
         """Return whether unknowns are those of an upright hull, not of another balance."""

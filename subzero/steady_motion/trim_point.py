@@ -10,7 +10,7 @@ current only carries the track.
 A motion that is impossible is refused with the reason, and the largest motion that is possible (`NoTrimError`).
 
 The force of the cable is that of `subzero.steady_motion.steady_pull`. A vehicle on thrusters has other unknowns
-(`thruster_motion`), and may stand still; a glider has, too (`glider_motion`), and must sink or rise.
+(`thruster_motion`), and may stand still; a glider has, too, and must sink or rise.
 """
 
 from __future__ import annotations
@@ -25,8 +25,6 @@ import numpy as np
 from subzero.files.text_repr import Overview
 from subzero.model import Model
 from subzero.steady_motion.asked import FASTEST, Asked, NoTrimError
-from subzero.steady_motion.glider_motion import GliderMotion, channel_demands, is_glider
-from subzero.steady_motion.glider_motion import refusal as glider_refusal
 from subzero.steady_motion.hull_state_space import (
     ACTUATORS,
     STATE_NAMES,
@@ -37,20 +35,25 @@ from subzero.steady_motion.hull_state_space import (
     demands,
     ideal,
     listed_commands,
-    resting_state,
     thruster_demands,
 )
-from subzero.steady_motion.propeller_motion import Motion
+from subzero.steady_motion.motion import (
+    GliderMotion,
+    Motion,
+    PropellerMotion,
+    channel_demands,
+    glider_refusal,
+    is_glider,
+)
 from subzero.steady_motion.steady_pull import SteadyPull
 from subzero.steady_motion.thruster_motion import ThrusterMotion, is_on_thrusters, refusal
 from vehicle import Vehicle
 
 RESIDUAL = 1e-9
 """Tolerances of accelerations and depth rate. [m/s2, rad/s2, m/s]"""
-AnyMotion = Motion | ThrusterMotion | GliderMotion
 
 
-def solved(motion: AnyMotion, y: np.ndarray) -> np.ndarray | None:
+def solved(motion: Motion, y: np.ndarray) -> np.ndarray | None:
     """Return the unknowns of a motion from a guess; None if they are not found."""
     from scipy.optimize import root
 
@@ -227,14 +230,10 @@ def _trim(model: Model, asked: Asked, pull_of: Pull | None = None) -> Trim:
     )
 
 
-def _motion(hull: Vehicle, asked: Asked, pull: SteadyPull) -> AnyMotion:
-    """Return the requested motion of a hull, on its thrusters or on propeller and fins."""
-    numbers = ideal(hull).numbers()
-    if is_on_thrusters(hull):
-        return ThrusterMotion.of(asked, hull, numbers, pull)
-    if is_glider(hull):
-        return GliderMotion.of(asked, hull, numbers, pull)
-    return Motion(asked=asked, numbers=numbers, rest=resting_state(hull), pull=pull, extra=np.zeros(6))
+def _motion(hull: Vehicle, asked: Asked, pull: SteadyPull) -> Motion:
+    """Return the requested motion of a hull by what drives it."""
+    kind = ThrusterMotion if is_on_thrusters(hull) else GliderMotion if is_glider(hull) else PropellerMotion
+    return kind(asked=asked, hull=hull, numbers=ideal(hull).numbers(), pull=pull)
 
 
 def _commands(hull: Vehicle, x: np.ndarray) -> np.ndarray:
@@ -251,7 +250,7 @@ def _demands(hull: Vehicle, x: np.ndarray) -> list[Demand]:
     return thruster_demands(hull, x) if is_on_thrusters(hull) else demands(hull, x)
 
 
-def _balanced(hull: Vehicle, motion: AnyMotion) -> np.ndarray:
+def _balanced(hull: Vehicle, motion: Motion) -> np.ndarray:
     """Return the state of a steady motion, at once from straight level motion, or in steps."""
     guess = motion.guess()
     direct = solved(motion, guess)

@@ -78,20 +78,20 @@ class Job:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # the run keeps its own
-                run, indices = self._run(first, rows)
-            return self._seen(first, run, indices, started)
+                run = self._run(rows)
+            return self._seen(first, run, started)
         except Exception as error:
             reported = str(error) if isinstance(error, UserError) else f"{type(error).__name__}: {error}"
             return self.failed(first, reported, perf_counter() - started)
 
-    def _run(self, index: int, row: np.ndarray) -> tuple[PlainRun, dict[str, float]]:
-        """Return the run of a member, and the indices that it is judged by."""
+    def _run(self, row: np.ndarray) -> PlainRun:
+        """Return the run of a member."""
         from subzero.simulation.run import simulate_plainly
 
         trial = with_parameters(self.trial, dict(zip(self.names, row.tolist(), strict=True)))
-        return simulate_plainly(trial, tethered=self.tethered), {}
+        return simulate_plainly(trial, tethered=self.tethered)
 
-    def _seen(self, index: int, run: PlainRun, indices: dict[str, float], started: float) -> Member:
+    def _seen(self, index: int, run: PlainRun, started: float) -> Member:
         """Return the outcomes of a run that are kept."""
         warned = tuple(
             (load["check"], load["message"]) for load in json.loads(run.attrs.get("warnings", "[]"))
@@ -102,7 +102,7 @@ class Job:
             index=index,
             reason="",
             warnings=warned,
-            scalars=scalars_of(run, self.outcomes.scalars, indices),
+            scalars=scalars_of(run, self.outcomes.scalars),
             channels=channels_of(run, self.outcomes),
             own=own_numbers(run, self.outcomes.function),
             seconds=perf_counter() - started,

@@ -2,7 +2,6 @@
 
     "peak_speed_m_s", "energy.hull_loss_J", "diagnostics.closure_error_m"      the numbers of a run's summary
     "cable_tension.max", "heading.end", "surge_speed.mean"                     a channel and a statistic of it
-    "index.overshoot"                                                          what a flight is judged by
 
 Scalars are float64, channels float32 (six to seven digits). A run that could not go on has none of them.
 """
@@ -75,7 +74,6 @@ TABLES = {
 }
 """Tables in it, and their numbers."""
 
-INDEX = "index."
 OWN = "own"
 """Name of the number that a function of one's own returns without a name."""
 
@@ -180,13 +178,7 @@ def _names(what: str, given: Any, default: tuple[str, ...]) -> tuple[str, ...]:
 def _check_scalar(name: str) -> None:
     """Raise an error for a name that no run has."""
     head, _, tail = name.rpartition(".")
-    known = (
-        name in SUMMARY
-        or tail in TABLES.get(head, ())
-        or (head in BY_NAME and tail in STATISTICS)
-        or name.startswith(INDEX)
-    )
-    if not known:
+    if not (name in SUMMARY or tail in TABLES.get(head, ()) or (head in BY_NAME and tail in STATISTICS)):
         raise UserError(
             f"There is no scalar {short(name)}.{suggestion(name, scalar_names())} Allowed: a number of a run's summary,"
             f" such as {SUMMARY[1]}, or channel.statistic with {', '.join(STATISTICS)}."
@@ -224,7 +216,7 @@ def in_words(name: str) -> str:
     return plain.replace("_", " ").replace(".", ": ")
 
 
-def scalars_of(run: AnyRun, names: tuple[str, ...], indices: Mapping[str, float]) -> np.ndarray:
+def scalars_of(run: AnyRun, names: tuple[str, ...]) -> np.ndarray:
     """Return scalars of a run (n,); NaN for one that this run does not have, such as an energy without a propeller."""
     needs_summary = any(name in SUMMARY or name.partition(".")[0] in TABLES for name in names)
     summary: dict[str, Any] = {}
@@ -232,12 +224,10 @@ def scalars_of(run: AnyRun, names: tuple[str, ...], indices: Mapping[str, float]
         from subzero.results.summary import summarise
 
         summary = summarise(run)
-    return np.array([_scalar(run, name, summary, indices) for name in names], dtype=float)
+    return np.array([_scalar(run, name, summary) for name in names], dtype=float)
 
 
-def _scalar(run: AnyRun, name: str, summary: Mapping[str, Any], indices: Mapping[str, float]) -> float | None:
-    if name.startswith(INDEX):
-        return indices.get(name.removeprefix(INDEX))
+def _scalar(run: AnyRun, name: str, summary: Mapping[str, Any]) -> float | None:
     head, _, tail = name.rpartition(".")
     if head in BY_NAME:
         values = run[head].values

@@ -25,6 +25,7 @@ import numpy as np
 
 from subzero.channels import BY_NAME, TIME
 from subzero.errors import UserError
+from subzero.results.netcdf_csv import full_disk_said
 from subzero.sweeps.design import Points
 from subzero.sweeps.member import Job, Member
 from subzero.sweeps.outcomes import unit_of
@@ -92,24 +93,18 @@ def write_result(
     )
     place = np.cumsum(drawn) - 1
     path = folder / RESULT
-    try:
-        with (
-            netCDF4.Dataset(path, "w") as file,
-            open(folder / TABLE, "w", newline="", encoding="utf-8") as table,
-        ):
-            _head(file, job, points, names, attributes)
-            rows = csv.writer(table, lineterminator="\n")
-            rows.writerow(["member", *points.names, *names, "reason", "warnings"])
-            for block in store.blocks():
-                _gather(block, found, own, drawn, place)
-                _write_block(file, block, job, found)
-                rows.writerows(_table_row(column, points, found) for column in block)
-    except RuntimeError as error:
-        if "HDF error" not in str(error):
-            raise
-        raise OSError(
-            0, f"{path.name} could not be written, perhaps because the disk is full ({error})"
-        ) from error
+    with (
+        full_disk_said(path),
+        netCDF4.Dataset(path, "w") as file,
+        open(folder / TABLE, "w", newline="", encoding="utf-8") as table,
+    ):
+        _head(file, job, points, names, attributes)
+        rows = csv.writer(table, lineterminator="\n")
+        rows.writerow(["member", *points.names, *names, "reason", "warnings"])
+        for block in store.blocks():
+            _gather(block, found, own, drawn, place)
+            _write_block(file, block, job, found)
+            rows.writerows(_table_row(column, points, found) for column in block)
     return found
 
 

@@ -214,10 +214,8 @@ def _reported(path: Path) -> Iterator[None]:
         yield
     except sqlite3.OperationalError as error:
         if "locked" in str(error):
-            why, remedy = (
-                "another command is running this sweep",
-                "Wait for it, or give another folder with --out DIR",
-            )
+            why = "another command is running this sweep"
+            remedy = "Wait for it, or give another folder with --out DIR"
         elif error.sqlite_errorcode & 0xFF in (
             sqlite3.SQLITE_FULL,
             sqlite3.SQLITE_IOERR,

@@ -63,11 +63,9 @@ def force_along(unmodelled: UnmodelledForce, setting: Setting, truth: Truth) -> 
 
 def factors_of(setting: Setting, truth: Truth) -> np.ndarray:
     """Return the factors of features (n, len(FACTORS)) along a truth, see `subzero.external_force`."""
-    r, water, out = (
-        truth.run.recording,
-        setting.model.water(),
-        np.zeros((truth.run.times.size, len(FACTORS))),
-    )
+    r = truth.run.recording
+    water = setting.model.water()
+    out = np.zeros((truth.run.times.size, len(FACTORS)))
     for row, time in enumerate(truth.run.times):
         nu_r = r.state[row, 7:13].copy()
         nu_r[:3] -= r.rotation[row].T @ water.at(r.state[row, :3], time)
@@ -123,6 +121,16 @@ def _pulse(axis: str, window: tuple[float, float], size: float) -> MissingForce:
     return _history(axis, time, size * np.array([0.0, 1.0, 1.0, 0.0]))
 
 
+def _formula(
+    name: str, sentence: str, term: Term, *more: Term, window: tuple[float, float] | None = None
+) -> UnmodelledForce:
+    """Return a force by a formula: on the axis, and with the feature, of its first term."""
+    missing = MissingForce(terms=(term, *more))
+    return UnmodelledForce(
+        name=name, sentence=sentence, axis=term.axis, feature=term.feature, missing=missing, window=window
+    )
+
+
 def snag(draw: Draw) -> UnmodelledForce:
     """A weed, a net, a rope: held for some seconds."""
     size = -draw.force * abs(draw.size(0.25, 0.8))
@@ -137,22 +145,14 @@ def snag(draw: Draw) -> UnmodelledForce:
 def fouling_shed(draw: Draw) -> UnmodelledForce:
     """Something caught on the hull, and shed again."""
     c = draw.force * abs(draw.size(0.25, 0.8))
-    return UnmodelledForce(
-        name="fouling_shed",
-        sentence="something clung to the hull for a while",
-        axis="X",
-        feature="u|u|",
-        missing=MissingForce(terms=(Term("X", "u|u|", -c),)),
-        window=draw.window(6.0, 12.0),
-    )
+    words = "something clung to the hull for a while"
+    return _formula("fouling_shed", words, Term("X", "u|u|", -c), window=draw.window(6.0, 12.0))
 
 
 def waves(draw: Draw) -> UnmodelledForce:
     """A slow swell across or from below."""
-    axis, time = (
-        str(draw.rng.choice(["Y", "Z"])),
-        np.arange(0.0, draw.duration + HISTORY_STEP_S, HISTORY_STEP_S),
-    )
+    axis = str(draw.rng.choice(["Y", "Z"]))
+    time = np.arange(0.0, draw.duration + HISTORY_STEP_S, HISTORY_STEP_S)
     period, phase = draw.between(4.0, 6.0), draw.between(0.0, 2.0 * np.pi)
     wave = draw.force * abs(draw.size(0.25, 0.8)) * np.sin(2.0 * np.pi * time / period + phase)
     words = "sideways" if axis == "Y" else "up and down"
@@ -164,38 +164,20 @@ def waves(draw: Draw) -> UnmodelledForce:
 def fouling_grows(draw: Draw) -> UnmodelledForce:
     """A drag that grows all the time."""
     c = draw.force * abs(draw.size(0.4, 1.2)) / draw.duration
-    return UnmodelledForce(
-        name="fouling_grows",
-        sentence="the drag of the hull grew all the time",
-        axis="X",
-        feature="time*u2",
-        missing=MissingForce(terms=(Term("X", "time*u2", -c),)),
-    )
+    return _formula("fouling_grows", "the drag of the hull grew all the time", Term("X", "time*u2", -c))
 
 
 def asymmetric_nose(draw: Draw) -> UnmodelledForce:
     """A lateral force at the bow, with the square of the speed."""
     c = draw.force * draw.size(0.1, 0.3)
     terms = Term("Y", "u|u|", c), Term("N", "u|u|", 0.4 * draw.length * c)
-    return UnmodelledForce(
-        name="bent_nose",
-        sentence="the water pushed the bow sideways",
-        axis="Y",
-        feature="u|u|",
-        missing=MissingForce(terms=terms),
-    )
+    return _formula("bent_nose", "the water pushed the bow sideways", *terms)
 
 
 def pitch_moment(draw: Draw) -> UnmodelledForce:
     """A pure moment with the square of the speed, without the force of a stern-plane."""
     c = draw.force * draw.length * draw.size(0.03, 0.1)
-    return UnmodelledForce(
-        name="pitch_moment",
-        sentence="the water pitched the hull",
-        axis="M",
-        feature="u|u|",
-        missing=MissingForce(terms=(Term("M", "u|u|", c),)),
-    )
+    return _formula("pitch_moment", "the water pitched the hull", Term("M", "u|u|", c))
 
 
 def roll_pulse(draw: Draw) -> UnmodelledForce:
@@ -224,38 +206,20 @@ def dying_push(draw: Draw) -> UnmodelledForce:
 def race_yaw(draw: Draw) -> UnmodelledForce:
     """A yaw moment of the propeller's race."""
     c = draw.force * draw.length * draw.size(0.02, 0.06) / 25.0**2
-    return UnmodelledForce(
-        name="race_yaw",
-        sentence="the propeller's race turned the hull",
-        axis="N",
-        feature="n|n|",
-        missing=MissingForce(terms=(Term("N", "n|n|", c),)),
-    )
+    return _formula("race_yaw", "the propeller's race turned the hull", Term("N", "n|n|", c))
 
 
 def thrust_lost(draw: Draw) -> UnmodelledForce:
     """Air or weed in the propeller for some seconds."""
     c = draw.force * abs(draw.size(0.5, 1.2)) / 25.0**2
-    return UnmodelledForce(
-        name="thrust_lost",
-        sentence="the propeller lost thrust for some seconds",
-        axis="X",
-        feature="n|n|",
-        missing=MissingForce(terms=(Term("X", "n|n|", -c),)),
-        window=draw.window(3.5, 5.0),
-    )
+    words = "the propeller lost thrust for some seconds"
+    return _formula("thrust_lost", words, Term("X", "n|n|", -c), window=draw.window(3.5, 5.0))
 
 
 def leak(draw: Draw) -> UnmodelledForce:
     """Water that comes in, all the time."""
     c = draw.force * abs(draw.size(0.2, 0.6)) / draw.duration
-    return UnmodelledForce(
-        name="leak",
-        sentence="the vehicle took in water",
-        axis="Z",
-        feature="time",
-        missing=MissingForce(terms=(Term("Z", "time", c),)),
-    )
+    return _formula("leak", "the vehicle took in water", Term("Z", "time", c))
 
 
 KINDS: dict[str, Callable[[Draw], UnmodelledForce]] = {

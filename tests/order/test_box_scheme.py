@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from cable import CableProperties, DrumProperties, Equation7
+from cable import CableProperties, Current, DrumProperties, Equation7
 from cable.feng_allen import run as feng_allen
 from cable.task import PullOut
 
@@ -18,7 +18,7 @@ from cable.task import PullOut
 def pull_out_boxes(tow_velocity, duration, step, *, segment_length=0.5, **others):
     """Return the run with the states of its nodes, which the public face does not show."""
     scheme = Equation7(time_step=step, segment_length=segment_length)
-    return feng_allen.pull_out_boxes(PullOut.of(tow_velocity, duration, **others), scheme)
+    return feng_allen.pull_out_boxes(PullOut(tow_velocity=tow_velocity, duration=duration, **others), scheme)
 
 
 DRAG = 0.5 * 1000.0 * np.pi * 0.0025 * 0.01
@@ -113,7 +113,11 @@ def test_the_cable_closes_between_drum_and_tow_point_to_second_order():
 
 def test_a_stretching_cable_in_a_cross_current_pays_out_less_than_it_covers():
     run = pull_out_boxes(
-        lambda _: (1.0, 0.0, 0.0), 20.0, 0.2, cable=CableProperties(compliance=0.05), current=(0.0, 0.1, 0.0)
+        lambda _: (1.0, 0.0, 0.0),
+        20.0,
+        0.2,
+        cable=CableProperties(compliance=0.05),
+        current=Current.uniform((0.0, 0.1, 0.0)),
     )
     assert run.converged
     assert run.tow_force[-1, 1] > 0.0  # the current sets east and pushes the cable, and the vehicle, east

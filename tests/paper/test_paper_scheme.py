@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cable import CableProperties, DrumProperties, Paper
+from cable import CableProperties, Current, DrumProperties, Paper
 from cable.feng_allen import run as feng_allen
 from cable.feng_allen.box_equations import Ends
 from cable.feng_allen.box_newton import box_workspace, start_paper
@@ -27,7 +27,7 @@ from cable.task import PullOut
 def pull_out_paper(tow_velocity, duration, step, *, reading="tangent", implicit=False, **others):
     """Return the run with the states of its nodes, which the public face does not show."""
     scheme = Paper(time_step=step, reading=reading, implicit=implicit)
-    return feng_allen.pull_out_paper(PullOut.of(tow_velocity, duration, **others), scheme)
+    return feng_allen.pull_out_paper(PullOut(tow_velocity=tow_velocity, duration=duration, **others), scheme)
 
 
 DRAG = 0.5 * 1000.0 * np.pi * 0.0025 * 0.01
@@ -120,7 +120,9 @@ def test_turning_the_manoeuvre_turns_the_force():
 
 def test_a_uniform_current_is_a_moving_frame_away_from_the_drum():
     """Towing ahead in still water or, on a drum that drifts with the stream, in a current: the same drag."""
-    run = pull_out_paper(lambda _: (1.5, 0.0, 0.0), 10.0, 1.0, current=(0.5, 0.0, 0.0), implicit=True)
+    run = pull_out_paper(
+        lambda _: (1.5, 0.0, 0.0), 10.0, 1.0, current=Current.uniform((0.5, 0.0, 0.0)), implicit=True
+    )
     np.testing.assert_allclose(run.tow_tension, DRAG * run.length, atol=1e-12)  # 1 m/s through the water
 
 
