@@ -48,8 +48,8 @@ differ by a hundredth of the noise. Truths come from the other formulation of th
 its tolerance. No choice in the program was made with these seeds before they were judged. Every record counts as it was
 first judged.
 
-**The records of the world are judged by the engine for any model** (30 November 2026, with two or three other programs on
-two processors, so that times are too long); names of records that no model is near to have changed since. **All
+**The records of the world are judged by the engine for any model** (30 November 2026, with two or three other programs
+on two processors, so that times are too long); names of records that no model is near to have changed since. **All
 other results, from errors in the data on, are of the search for causes that it replaced**: they are what it is to be
 held against, and are not yet measured anew. The page is written by
 
