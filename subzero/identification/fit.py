@@ -196,15 +196,20 @@ def log_levels(problem: Problem, terms: Terms, levels: Levels) -> float:
 
 def _log_times(problem: Problem, levels: Levels) -> float:
     """Return the log prior density of the correlation times of all channels, logger by logger."""
-    loggers: dict[str, list[str]] = {}
-    for name in levels.noise:
-        loggers.setdefault(problem.model.channels[name].logger, []).append(name)
     return sum(
         log_times(
             [levels.noise[name] for name in own], [problem.channels[name].prior.interval for name in own]
         )
-        for own in loggers.values()
+        for own in _loggers(problem, levels).values()
     )
+
+
+def _loggers(problem: Problem, levels: Levels) -> dict[str, list[str]]:
+    """Return logger → its channels."""
+    found: dict[str, list[str]] = {}
+    for name in levels.noise:
+        found.setdefault(problem.model.channels[name].logger, []).append(name)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,13 +282,14 @@ def _best_noise(problem: Problem, linear: Linear, products: Products, levels: Le
         given_others(problem, linear, products, levels, name),
     )
 
-    def with_noise(noise: Noise) -> Levels:
-        return replace(levels, noise={**levels.noise, name: noise})
+    own = _loggers(problem, levels)[problem.model.channels[name].logger]
+    intervals = [problem.channels[each].prior.interval for each in own]
 
     def log_more(noise: Noise) -> float:
-        return _log_times(problem, with_noise(noise))
+        return log_times([noise if each == name else levels.noise[each] for each in own], intervals)
 
-    return with_noise(most_probable(levels.noise[name], prior, times, columns, log_more))
+    best = most_probable(levels.noise[name], prior, times, columns, log_more)
+    return replace(levels, noise={**levels.noise, name: best})
 
 
 def given_others(

@@ -10,6 +10,7 @@ white (Rasmussen & Williams 2006, app. B; Hartikainen & Särkkä 2010).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -72,12 +73,12 @@ class NoisePrior:
     @property
     def most(self) -> float:
         """The level at its upper end: a slow part that is larger is no noise of a sensor. [unit of the channel]"""
-        return self.level * float(np.exp(self.spread))
+        return self.level * math.exp(self.spread)
 
     @property
     def least(self) -> float:
         """The level at its lower end. [unit of the channel]"""
-        return self.level * float(np.exp(-self.spread))
+        return self.level * math.exp(-self.spread)
 
     def usual(self) -> Noise:
         """Return the noise at its median."""
@@ -85,14 +86,11 @@ class NoisePrior:
 
     def log_density(self, noise: Noise) -> float:
         """Return the log prior density of σ_w and σ_s, up to a constant; that of τ_s is `log_times`."""
-        binds = noise.slow > self.most or abs(np.log(noise.white / self.level)) > BINDING * self.spread
-        if binds or noise.time < SLOWEST_WHITE * self.interval:
-            return -np.inf
-        off = (
-            np.log(noise.white / self.level) / self.spread,
-            np.log(noise.slow / (SLOW_SHARE * self.level)) / SLOW_SPREAD,
-        )
-        return -0.5 * float(np.sum(np.square(off)))
+        white = math.log(noise.white / self.level) / self.spread
+        if noise.slow > self.most or abs(white) > BINDING or noise.time < SLOWEST_WHITE * self.interval:
+            return -math.inf
+        slow = math.log(noise.slow / (SLOW_SHARE * self.level)) / SLOW_SPREAD
+        return -0.5 * (white**2 + slow**2)
 
 
 def log_times(noise: Sequence[Noise], intervals: Sequence[float]) -> float:
@@ -161,10 +159,9 @@ class Filter:
     @classmethod
     def of(cls, noise: Noise, resolution: float, times: np.ndarray) -> Filter:
         """Return the filter at the times of the samples (m,); where they fall, a new record begins. [s]"""
-        steps = np.diff(times, append=times[-1:])
-        decay = np.where(steps >= 0.0, np.exp(-np.abs(steps) / noise.time), 0.0)
-        gain, scale = np.empty(times.size), np.empty(times.size)
-        gains(decay, noise.white**2 + resolution**2 / 12.0, noise.slow**2, gain, scale)
+        decay, gain, scale = np.empty(times.size), np.empty(times.size), np.empty(times.size)
+        white = noise.white**2 + resolution**2 / 12.0
+        gains(times, noise.time, white, noise.slow**2, decay, gain, scale)
         return cls(decay, gain, scale)
 
     @property
@@ -180,10 +177,20 @@ class Filter:
 
 
 @compiled
-def gains(decay: np.ndarray, white: float, slow: float, gain: np.ndarray, scale: np.ndarray) -> None:
-    """Fill the Kalman gain, and the standard deviation of the innovation, of every sample (m,)."""
+def gains(
+    times: np.ndarray,
+    lasting: float,
+    white: float,
+    slow: float,
+    decay: np.ndarray,
+    gain: np.ndarray,
+    scale: np.ndarray,
+) -> None:
+    """Fill decay to the next sample, Kalman gain and standard deviation of the innovation of every sample (m,)."""
     left = slow
     for i in range(decay.size):
+        step = times[i + 1] - times[i] if i + 1 < decay.size else 0.0
+        decay[i] = np.exp(-step / lasting) if step >= 0.0 else 0.0
         seen = left + white
         gain[i] = left / seen
         scale[i] = np.sqrt(seen)
@@ -235,13 +242,13 @@ def most_probable(
     """
 
     def at(log: np.ndarray) -> Noise:
-        white, slow, time = (np.array([before.white, before.slow, before.time]) * np.exp(log)).tolist()
-        return Noise(white, slow, time)
+        white, slow, time = np.exp(log).tolist()
+        return Noise(white * before.white, slow * before.slow, time * before.time)
 
     def negative(log: np.ndarray) -> float:
         noise = at(log)
         density = prior.log_density(noise)
-        if not np.isfinite(density):
+        if density == -math.inf:
             return 1e300
         return -log_marginal(Filter.of(noise, prior.resolution, times), columns) - density - log_more(noise)
 

@@ -80,10 +80,8 @@ class Noise:
         """The decay of the slow part to the next sample, the Kalman gain, and the innovations' standard deviation
         (m,).
         """
-        # The last step is 0: there is no next sample, and that decay is not used.
-        kept = np.exp(-np.diff(self.time, append=self.time[-1:]) / self.correlation_time)
-        gain, scale = np.empty(self.count), np.empty(self.count)
-        gains_of(kept, self.unrelated, self.slow**2, gain, scale)
+        kept, gain, scale = np.empty(self.count), np.empty(self.count), np.empty(self.count)
+        gains_of(self.time, self.correlation_time, self.unrelated, self.slow**2, kept, gain, scale)
         return kept, gain, scale
 
     @property
