@@ -242,10 +242,10 @@ LOOKS = 20_000
 
 
 @allocating
-def share(batch: Any, count: int, stays: bool) -> bool:
+def share(batch: Any, count: int, waits: bool) -> bool:
     """Take so many exchanges of each run of a batch that no thread has taken yet, one after another.
 
-    A thread that is late has less to do, or nothing; the lock of Python is let go of once. One that `stays` looks for
+    A thread that is late has less to do, or nothing; the lock of Python is let go of once. One that `waits` looks for
     the next `begin` for a while, the others for the end of this one.
 
     Returns:
@@ -253,9 +253,9 @@ def share(batch: Any, count: int, stays: bool) -> bool:
     """
     runs, looks = len(batch.handles), 0
     _take(batch, count)
-    while looks < LOOKS and (stays or add(batch.done, 0) < runs):
+    while looks < LOOKS and (waits or add(batch.done, 0) < runs):
         looks += 1
-        if stays and add(batch.taken, 0) < runs:
+        if waits and add(batch.taken, 0) < runs:
             _take(batch, count)
             looks = 0
     return bool(add(batch.done, 0) == runs)

@@ -109,7 +109,7 @@ def _of_channel(
     e, level, turn = linear.e[name], problem.levels(linear.terms)[name], problem.model.channels[name].turn
     simulated = problem.recorded(name, linear.terms) - e
     yield from repeats(problem, name, linear.terms, simulated, data_odds(problem))
-    # A model that usually misses something misses jumps, too: they are not told from steps of a sensor.
+    # A model that usually misses something misses jumps, too: they are not distinguished from steps of a sensor.
     soft = [term for term in own if term.kind == "offset" and not problem.model.always]
     for rest in others if soft else ():
         yield from _step(rest, name, soft[0])
