@@ -27,7 +27,7 @@ TUG, TUG_SIZE = 4, 3
 """First column of `Now.tug` in the trace, and how many there are."""
 SNAP_SHARE = 0.1
 """A pull lasts as long as it is, on average from one result to the next, more than this share of the strongest. [-]"""
-MOST_QUICKER = 8.0
+MOST_QUICKER = 4.0
 """So many times as many rows are filled at a time as the last time, at most: with more cable, later ones take longer.
 [-]"""
 
