@@ -208,10 +208,6 @@ class Search:
         best = self.ranked()[0]
         return self.problem.outliers(best.terms, best.linear.e) if self.complete else {}
 
-    def is_compared(self, fitted: Fit) -> bool:
-        """Return whether unknown inputs, if the model has any that may act, have had their chance beside a fit."""
-        return self.complete or not self._unknown or key(fitted.terms) in self._offered
-
     def _within_time(self, part: Callable[[], None]) -> None:
         """Do a part of the search; if its time is over, or the user interrupts it, what was found is kept."""
         try:

@@ -154,14 +154,14 @@ def test_a_cause_is_named_as_the_cause(numbers, cause):
     assert ids(verdict.named) == [cause]
 
 
-def test_a_search_that_ends_before_unknown_inputs_had_their_chance_names_no_cause(monkeypatch):
+def test_a_search_that_is_ended_before_unknown_inputs_had_their_chance_names_no_cause(monkeypatch):
     monkeypatch.setattr("subzero.identification.search.MOST_FITS", 2)
     verdict = sd.diagnose(record(0, k=4.6), model())
     assert not verdict.complete
     assert verdict.named == ()
     (stiffness,) = verdict.suspected
     assert stiffness.id == "stiffness"
-    assert stiffness.against == ("the search ended before it was compared with an unknown input",)
+    assert stiffness.against == ("the search was ended before all was compared with unknown inputs",)
 
 
 @pytest.mark.parametrize(
