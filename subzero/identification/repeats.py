@@ -45,7 +45,7 @@ def repeats(problem: Problem, name: str, terms: Terms, simulated: np.ndarray, od
         usual = problem.prior(name, ())
         far = FAR * _noise(usual.level, usual.resolution)
         values = returns_of(each.values, at, far) if usual.resolution else []
-        for found in values or [runs_of(each.values, at)]:
+        for found in (runs_of(each.values, at), *values):
             runs = [run for run in found if not _is_saturated(problem, name, each.values, run)]
             if runs and _moves(problem, name, terms, runs, at, simulated):
                 yield from _terms(each.time, name, record, runs, odds / at.size)
