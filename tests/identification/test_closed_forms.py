@@ -11,6 +11,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 import subzero.diagnosis as sd
+from subzero.identification.candidates import declared, suggested
 from subzero.identification.explanation import data_terms
 from subzero.identification.fit import (
     Levels,
@@ -344,6 +345,22 @@ def test_the_slope_of_a_delay_is_that_between_two_samples():
     x[place] = 0.99 * STEP
     slope = problem.jacobian((late,), entries, x, [place])["x"][1:, 0]
     np.testing.assert_allclose(slope, -np.diff(shown) / STEP, atol=1e-9)
+
+
+def test_a_delay_that_is_far_from_usual_is_as_probable_as_any_other():
+    """Its prior about itself, times its odds, is a uniform density: of 16 usual ones to either side, as is tried."""
+    made = record(3)
+    x = np.interp(made.time - 9.0, made.time, made.columns["x"])
+    problem = Problem(model(unknown=False), [replace(made, columns={**made.columns, "x": x})])
+    entries = problem.entries(())
+    centre = np.array([entry.centre for entry in entries])
+    here = linearised(problem, (), entries, centre, usual_levels(problem, ()))
+    (late,) = [term for term in declared(problem) if term.kind == "delay"]
+    (found,) = [term for term in suggested(problem, here, [late]) if term.kind == "delay"]
+    (own,) = [entry for entry in problem.entries((found,)) if entry.kind == "delay"]
+    assert own.centre == found.centre == pytest.approx(9.0, abs=0.05)
+    density = found.odds / (np.sqrt(2.0 * np.pi) * own.sd)
+    assert density == pytest.approx(late.odds / (2.0 * 16.0 * own.sd))
 
 
 @pytest.mark.parametrize("third", [False, True])
