@@ -78,8 +78,10 @@ class Locks:
     reasons: tuple[str, ...]
 
 
-def locks(problem: Problem, best: Fit, held_out: Sequence[Record], *, complete: bool) -> dict[str, Locks]:
-    """Return the locks of every term of the best explanation, of a search that came to its end or not: id → locks."""
+def locks(problem: Problem, best: Fit, held_out: Sequence[Record], *, compared: bool) -> dict[str, Locks]:
+    """Return the locks of every term of the best explanation, which was compared with unknown inputs or not:
+    id → locks.
+    """
     terms, gap = [term for term in best.terms if term.kind != "tolerances"], _gap(problem, best.terms)
     split = _split(problem, held_out) if gap == math.inf else -math.inf
     tried = [term for term in terms if not _begins_too_late(term, split)]
@@ -92,14 +94,14 @@ def locks(problem: Problem, best: Fit, held_out: Sequence[Record], *, complete: 
         gains |= _gains(problem, best, others, _folds(problem, held_out, split, gap))
     rests = _share_unknown(problem, terms) > MOST and rests_on_histories(problem, best)
     return {
-        term.id: _locks(problem, term, gains.get(term.id), rests=rests, complete=complete) for term in terms
+        term.id: _locks(problem, term, gains.get(term.id), rests=rests, compared=compared) for term in terms
     }
 
 
-def _locks(problem: Problem, term: Term, gain: Gain | None, *, rests: bool, complete: bool) -> Locks:
+def _locks(problem: Problem, term: Term, gain: Gain | None, *, rests: bool, compared: bool) -> Locks:
     reasons = [f"{name} may as well act late or early" for name in _late_commands(problem, term)]
-    if problem.model.offered and not complete and term.kind not in PLAIN:
-        reasons.append("the search was ended before all was compared with unknown inputs")
+    if problem.model.offered and not compared and term.kind not in PLAIN:
+        reasons.append("the search was ended before this was compared with unknown inputs")
     if rests and term.kind not in PLAIN:
         reasons.append(
             "an unknown input acts for most of the time, without which the model explains less than half of a channel"

@@ -1,11 +1,11 @@
 """The search for explanations: ranked in the linear problem, the best fitted with simulations; add, drop, swap.
 
-It begins twice: at the nominal model, where gross errors in the data are plain whatever a fit would bend, and at the
-fit of "nothing is wrong". Without a gross error a fit moves the parameters to suit the wrong readings: what may stand
-in its place is judged where the fit with it ends.
+It begins twice: at the nominal model, where gross errors in the data are plain whatever a fit would bend, and so is a
+single cause that explains more than they do; and at the fit of "nothing is wrong". Without a gross error a fit moves
+the parameters to suit the wrong readings: what may stand in its place is judged where the fit with it ends.
 
 Inputs that are 0 in a healthy model cost a simulation for each knot. They are offered when nothing else gains: with the
-best explanation, and without the causes in it.
+best explanation, and without the causes in it. A part of the time is kept for that.
 """
 
 from __future__ import annotations
@@ -69,6 +69,8 @@ FEW_CAUSES = 12
 """So many causes are all fitted by themselves, whatever their rank."""
 MOST_FITS = 60
 """The search ends after so many fits, and says so."""
+FOR_UNKNOWN = 0.25
+"""Share of a search's time that is kept to compare its best explanation with unknown inputs. [-]"""
 
 Key = tuple[tuple[str, float, float], ...]
 
@@ -124,6 +126,7 @@ class Search:
         fits: explanation → its best fit.
         ranks: explanation with one term more than another → its score in the linear problem of that one.
         complete: whether it came to its end.
+        compared: the latest explanation that was compared with unknown inputs; None if none was.
         interrupted: whether the user ended it.
         screened: the explanation to which one term more was only ranked; None for a whole search.
     """
@@ -135,11 +138,13 @@ class Search:
     fits: dict[Key, Fit] = field(default_factory=dict)
     ranks: dict[Key, dict[Key, float]] = field(default_factory=dict)
     complete: bool = True
+    compared: Key | None = None
     interrupted: bool = False
     screened: Key | None = None
 
     def __post_init__(self) -> None:
-        self._end = process_time() + self.seconds
+        self._begun = process_time()
+        self._end = self._begun + (1.0 - FOR_UNKNOWN) * self.seconds
         self._expanded: dict[tuple[str, ...], float] = {}
         self._left: set[Key] = set()
         self._tried: set[Key] = set()
@@ -224,12 +229,33 @@ class Search:
         centre = np.array([entry.centre for entry in entries])
         nominal = linearised(problem, (), entries, centre, usual_levels(problem, ()), must=True)
         if (fitted := self.begin) is None:
-            self._fit(self._greedy(nominal))
+            self._fit_first(nominal)
         else:
             self._fit(linearised(problem, fitted.terms, fitted.entries, fitted.x, fitted.linear.levels))
         self._fit(nominal)
 
+    def _fit_first(self, nominal: Linear) -> None:
+        """Fit the gross errors in the data that gain most at the nominal model; where they do not explain the records,
+        and a single term is ranked higher there, fit that one with the gross errors beside it.
+        """
+        gross = self._greedy(nominal)
+        if not follows(self.problem, self._fit(gross)):
+            ranked = self._additions(nominal, self._terms)
+            if ranked and ranked[0][0] > self._linear_score(gross):
+                self._fit(self._greedy(ranked[0][1]))
+
     def _run(self, with_outliers: bool) -> None:
+        """Search; where the time or the number of fits does not suffice, an unknown input is tried all the same."""
+        try:
+            self._explore(with_outliers)
+        except _TimeOverError:
+            self.complete = False
+        if not self.complete:
+            self._end = self._begun + self.seconds
+            while self._fit_unknown():
+                pass
+
+    def _explore(self, with_outliers: bool) -> None:
         for first in {key(each.terms): each for each in (self.fits[()], self.ranked()[0])}.values():
             self._fit_single_causes(first)
         while (base := self._next()) is not None or self._fit_unknown():
@@ -257,13 +283,14 @@ class Search:
         if len(self.fits) > before or doubtful:
             self._fit_unknown_with(self._without_causes(best))
             self._fit_unknown_with(self.fits[()])
+        self.compared = key(best.terms)
         return len(self.fits) > before
 
     def _fit_unknown_with(self, base: Fit) -> None:
         """Fit unknown inputs with a base, once."""
         if key(base.terms) not in self._offered:
-            self._offered.add(key(base.terms))
             self._fit_ranked(base.linear, self._ranked_unknown(base.linear))
+            self._offered.add(key(base.terms))
 
     def _causes_of(self, base: Fit) -> list[Term]:
         """Return the terms of an explanation but for gross errors in the data: an unknown input may look like them."""

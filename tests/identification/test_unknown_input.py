@@ -7,6 +7,7 @@ Truth is exact: steps of the linear equations with a force that is linear betwee
 Runge-Kutta.
 """
 
+import itertools
 import json
 
 import numpy as np
@@ -154,14 +155,24 @@ def test_a_cause_is_named_as_the_cause(numbers, cause):
     assert ids(verdict.named) == [cause]
 
 
-def test_a_search_that_is_ended_before_unknown_inputs_had_their_chance_names_no_cause(monkeypatch):
+def test_a_search_that_is_ended_by_its_number_of_fits_compares_what_it_found_with_unknown_inputs(monkeypatch):
     monkeypatch.setattr("subzero.identification.search.MOST_FITS", 2)
     verdict = sd.diagnose(record(0, k=4.6), model())
+    assert not verdict.complete
+    assert ids(verdict.named) == ["stiffness"]
+
+
+def test_a_search_whose_time_is_over_before_that_names_no_cause(monkeypatch):
+    """A clock that goes by one at each look; after some fits the time is over, and none is kept."""
+    monkeypatch.setattr("subzero.identification.search.FOR_UNKNOWN", 0.0)
+    monkeypatch.setattr("subzero.identification.search.process_time", map(float, itertools.count()).__next__)
+    monkeypatch.setattr("subzero.identification.api.process_time", lambda: 0.0)
+    verdict = sd.diagnose(record(4, k=4.6, left=hidden(4, 0.05)), model(), seconds=2.5)
     assert not verdict.complete
     assert verdict.named == ()
     (stiffness,) = verdict.suspected
     assert stiffness.id == "stiffness"
-    assert stiffness.against == ("the search was ended before all was compared with unknown inputs",)
+    assert stiffness.against == ("the search was ended before this was compared with unknown inputs",)
 
 
 @pytest.mark.parametrize(
