@@ -83,11 +83,6 @@ def key(terms: Terms) -> Key:
     )
 
 
-def ids(terms: Terms) -> tuple[str, ...]:
-    """Return what an explanation is, whatever the known units of its channels are."""
-    return tuple(term.id for term in terms)
-
-
 def _is_gross_kind(term: Term) -> bool:
     """Return whether an error in the data may be a gross one, which no cause can imitate."""
     begins = term.is_data_error and math.isfinite(term.begins)
@@ -145,11 +140,12 @@ class Search:
     def __post_init__(self) -> None:
         self._begun = process_time()
         self._end = self._begun + (1.0 - FOR_UNKNOWN) * self.seconds
-        self._expanded: dict[tuple[str, ...], float] = {}
+        self._expanded: dict[tuple[tuple[str, str], ...], float] = {}
         self._left: set[Key] = set()
         self._tried: set[Key] = set()
         self._added: dict[int, tuple[Linear, list[tuple[float, Linear]]]] = {}
         self._offered: set[Key] = set()
+        self._refuted: list[tuple[set[str], str, float]] = []
         self._sensitivities = Sensitivities(self.problem)
         self._terms, self._unknown = declared(self.problem), unknown_terms(self.problem.model)
         # Offsets are among them for those that begin in mid-record, errors of a channel's times for unusual ones.
@@ -348,7 +344,7 @@ class Search:
     def _next(self) -> Fit | None:
         """Return the best explanation that was neither expanded nor left for a better one, if it is near the best of
         all, and no part of it is better: what a term more did not gain, two will not. Nor if it is like one that was
-        expanded, with another known unit of a channel, and not much better.
+        expanded, and not much better.
         """
         ranked = self.ranked()
         best = self.score(ranked[0])
@@ -356,10 +352,23 @@ class Search:
             own = set(key(each.terms))
             simpler = any(set(key(other.terms)) < own for other in ranked[:i])
             done = key(each.terms) in self._left
-            like = self._expanded.get(ids(each.terms), -np.inf)
+            like = self._expanded.get(self._alike(each.terms), -np.inf)
             if self.score(each) > max(best - WITHIN, like + WITHIN) and not (simpler or done):
                 return each
         return None
+
+    def _alike(self, terms: Terms) -> tuple[tuple[str, str], ...]:
+        """Return what an explanation has in common with those that say nearly the same: with another known unit of a
+        channel, or an error of its twin.
+        """
+        sensors = self.problem.model.channels
+        found = [
+            (term.kind, sensors[term.target].unit)
+            if term.kind in TWINS and term.target in sensors
+            else (term.id, "")
+            for term in terms
+        ]
+        return tuple(sorted(found))
 
     def _expand(self, base: Fit) -> None:
         """Fit the best explanations that are one move away: gross errors in the data first, as all else depends on
@@ -373,7 +382,7 @@ class Search:
         if better is not base:
             self._left.add(key(base.terms))
             return
-        self._expanded[ids(base.terms)] = self.score(base)
+        self._expanded[self._alike(base.terms)] = self.score(base)
         self._fit_additions(base.linear)
         for term in base.terms:
             bare = self.there(base.linear, without(base.terms, term))
@@ -425,8 +434,18 @@ class Search:
         for score, linear in added:
             late = any(term.kind == "cause" and math.isfinite(term.begins) for term in linear.terms)
             near = min(self._best(), added[0][0]) - WITHIN - (ONSET_GAIN if late else 0.0)
-            if score > max(here - WORTH, near):
-                self._fit(linear, score)
+            new = _new(base, linear).id
+            if score < max(here - WORTH, near) or self._is_refuted(base.terms, new, score - here):
+                continue
+            if self.score(self._fit(linear, score)) < min(here, score - GROSS):
+                self._refuted.append(({term.id for term in base.terms}, new, score - here))
+
+    def _is_refuted(self, terms: Terms, new: str, gain: float) -> bool:
+        """Return whether a fit has shown, with some of these terms, that another one gains nothing, of which the linear
+        problem expected as much and was far wrong: it expects that with any terms, and each such fit is long.
+        """
+        own = {term.id for term in terms}
+        return any(new == name and base <= own and gain < most + WITHIN for base, name, most in self._refuted)
 
     def _twins(self, term: Term) -> Iterator[Term]:
         """Yield the same error, undone, of other channels of its unit: two gauges differ, and either may be wrong."""
