@@ -324,9 +324,12 @@ def data_terms(model: Model) -> list[Term]:
             )
             for factor, offset, words in known
         ]
-    if len(suspects) > 2 and len(suspects) == len(model.channels):  # of two, the delay of one says it
+    if len(suspects) > 1 and len(suspects) == len(model.channels):
         sentence = "all channels are late or early, or the inputs early or late"
         found.append(Term(f"delay:{CLOCK}", sentence, "delay", CLOCK, PRIOR_DATA / 5.0))
+    if len(suspects) > 2 and len(suspects) == len(
+        model.channels
+    ):  # with few, a model that is too slow looks like it
         sentence = "the clock of all channels runs fast or slow against that of the inputs"
         found.append(Term(f"rate:{CLOCK}", sentence, "rate", CLOCK, PRIOR_DATA / 5.0))
     pairs = list(combinations(suspects, 2))

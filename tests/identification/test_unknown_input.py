@@ -189,6 +189,17 @@ def test_an_error_in_the_data_is_no_force(error, wrong):
     assert ids(verdict.named) == [error]
 
 
+@pytest.mark.parametrize("late", [5, pytest.param(33, marks=pytest.mark.long)])
+def test_two_channels_that_are_late_together_have_one_late_clock(late):
+    """By 0.5 s, which is usual, and by 3.3 s, a whole period of the carts."""
+    given = record(5)
+    shown = {name: np.append(np.full(late, np.nan), given.columns[name][:-late]) for name in "ab"}
+    (found,) = sd.diagnose(changed(given, **shown), model()).named
+    assert found.id == "delay:clock"
+    (delay,) = found.estimates
+    assert delay.value == pytest.approx(STEP * late, abs=max(3.0 * delay.sd, 0.01))
+
+
 @pytest.mark.long
 def test_a_force_is_found_beside_a_cause_a_unit_and_another_force():
     seen = record(6, left=hidden(6))
