@@ -25,7 +25,7 @@ from subzero.identification.named_terms import NAMED_PROBABILITY, histories, nam
 from subzero.identification.nearness import Nearness, nearness, rms
 from subzero.identification.problem import Problem, Progress
 from subzero.identification.record import Record
-from subzero.identification.search import Search, key
+from subzero.identification.search import Search
 from subzero.identification.verdict import (
     CALIBRATED,
     CAUSE_NAMED,
@@ -144,8 +144,7 @@ def _concluded(search: Search, held_out: Sequence[Record], outliers: Mapping[str
     best, probabilities = ranked[0], _probabilities(search, ranked)
     free = free_fit(problem, best.terms, best.values, best.linear.levels.sizes)
     near = nearness(problem, best, free)
-    compared = search.complete or search.compared == key(best.terms)
-    own = locks(problem, best, held_out, compared=compared) if near.near else {}
+    own = locks(problem, best, held_out, settled=search.settled) if near.near else {}
     terms = [
         named_term(problem, best, said, own.get(said.term.id), near)
         for said in said_of(ranked, probabilities)

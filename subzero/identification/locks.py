@@ -36,7 +36,8 @@ MOST = 0.5
 """Where unknown inputs act for a longer share of the time, and a channel rests on them, little bears witness. [-]"""
 PLAIN = ("unknown", "unit", "stuck")
 """Kinds of terms that are named all the same: a known unit is plain, also where a model follows with an input's help
-(and `nearness` sees to it that the unit is not all that explains a channel); so are equal readings."""
+(and `nearness` sees to it that the unit is not all that explains a channel); so are equal readings. Another sign or a
+turn is not: a model that is wrong may go the other way."""
 BLOCKS, DRAWS, SURE = 20, 2000, 0.05
 """Blocks of a record, draws of the bootstrap, and the share of them outside an interval, to either side."""
 
@@ -78,10 +79,8 @@ class Locks:
     reasons: tuple[str, ...]
 
 
-def locks(problem: Problem, best: Fit, held_out: Sequence[Record], *, compared: bool) -> dict[str, Locks]:
-    """Return the locks of every term of the best explanation, which was compared with unknown inputs or not:
-    id → locks.
-    """
+def locks(problem: Problem, best: Fit, held_out: Sequence[Record], *, settled: bool) -> dict[str, Locks]:
+    """Return the locks of every term of the best explanation, next to which all was tried or not: id → locks."""
     terms, gap = [term for term in best.terms if term.kind != "tolerances"], _gap(problem, best.terms)
     split = _split(problem, held_out) if gap == math.inf else -math.inf
     tried = [term for term in terms if not _begins_too_late(term, split)]
@@ -94,15 +93,15 @@ def locks(problem: Problem, best: Fit, held_out: Sequence[Record], *, compared: 
         gains |= _gains(problem, best, others, _folds(problem, held_out, split, gap))
     rests = _share_unknown(problem, terms) > MOST and rests_on_histories(problem, best)
     return {
-        term.id: _locks(problem, term, gains.get(term.id), rests=rests, compared=compared) for term in terms
+        term.id: _locks(problem, term, gains.get(term.id), rests=rests, settled=settled) for term in terms
     }
 
 
-def _locks(problem: Problem, term: Term, gain: Gain | None, *, rests: bool, compared: bool) -> Locks:
+def _locks(problem: Problem, term: Term, gain: Gain | None, *, rests: bool, settled: bool) -> Locks:
     reasons = [f"{name} may as well act late or early" for name in _late_commands(problem, term)]
-    if problem.model.offered and not compared and term.kind not in PLAIN:
-        reasons.append("the search was ended before this was compared with unknown inputs")
-    if rests and term.kind not in PLAIN:
+    if not settled and not _is_plain(term):
+        reasons.append("the search was ended before all that is next to it was tried")
+    if rests and not _is_plain(term):
         reasons.append(
             "an unknown input acts for most of the time, without which the model explains less than half of a channel"
         )
@@ -112,6 +111,10 @@ def _locks(problem: Problem, term: Term, gain: Gain | None, *, rests: bool, comp
             f"{gain.after:.2f} with it"
         )
     return Locks(gain, tuple(reasons))
+
+
+def _is_plain(term: Term) -> bool:
+    return term.kind in PLAIN and not (term.kind == "unit" and abs(term.factor) == 1.0)
 
 
 def _share_unknown(problem: Problem, terms: Sequence[Term]) -> float:

@@ -153,6 +153,12 @@ class Search:
         self._gross = [term for term in self._terms if term.kind in may_be or _is_gross_kind(term)]
         self._loggers = {name: sensor.logger for name, sensor in self.problem.model.channels.items()}
 
+    @property
+    def settled(self) -> bool:
+        """Whether all that is next to the best explanation was tried, also if the search did not come to its end."""
+        best = self.ranked()[0].terms
+        return self.complete or (self.compared == key(best) and self._alike(best) in self._expanded)
+
     def score(self, fitted: Fit) -> float:
         """Return the log posterior probability of an explanation, up to a constant."""
         return fitted.log_evidence + log_prior(fitted.terms, self._loggers)
@@ -272,6 +278,7 @@ class Search:
         """
         best, before = self.ranked()[0], len(self.fits)
         if not self._unknown:
+            self.compared = key(best.terms)
             return False
         self._fit_unknown_with(best)
         own = self._causes_of(best)
@@ -371,9 +378,11 @@ class Search:
         return tuple(sorted(found))
 
     def _expand(self, base: Fit) -> None:
-        """Fit the best explanations that are one move away: gross errors in the data first, as all else depends on
-        them.
+        """Fit the best explanations that are one move away: those with a term less first, which are expanded instead if
+        they are better; then with other gross errors in the data, as all else depends on them.
         """
+        if self._is_simpler_better(base):
+            return
         better, gross = base, []
         for term in base.terms:
             if self._is_gross(base, term):
@@ -382,7 +391,6 @@ class Search:
         if better is not base:
             self._left.add(key(base.terms))
             return
-        self._expanded[self._alike(base.terms)] = self.score(base)
         self._fit_additions(base.linear)
         for term in base.terms:
             bare = self.there(base.linear, without(base.terms, term))
@@ -395,6 +403,16 @@ class Search:
                 linear = self.there(base.linear, with_term(without(base.terms, term), twin))
                 if linear and self._own_score(linear) > self.score(base) - GROSS:
                     self._fit(linear)
+        self._expanded[self._alike(base.terms)] = self.score(base)
+
+    def _is_simpler_better(self, base: Fit) -> bool:
+        """Fit an explanation without each of its terms that the linear problem does not miss; return whether one of
+        these is better.
+        """
+        there = [self.there(base.linear, without(base.terms, term)) for term in base.terms]
+        ranked = sorted(((self._own_score(bare), bare) for bare in there if bare), key=lambda pair: -pair[0])
+        worth = (pair for pair in ranked if pair[0] > self.score(base))
+        return any(self.score(self._fit(bare, rank, again=True)) > self.score(base) for rank, bare in worth)
 
     def _is_gross(self, base: Fit, term: Term) -> bool:
         """Return whether a term is an error that no cause can imitate (as one may an offset, a scale, a drift or a
