@@ -460,10 +460,13 @@ class Search:
 
     def _is_refuted(self, terms: Terms, new: str, gain: float) -> bool:
         """Return whether a fit has shown, with some of these terms, that another one gains nothing, of which the linear
-        problem expected as much and was far wrong: it expects that with any terms, and each such fit is long.
+        problem expected the same and was far wrong: it expects that with any terms, and each such fit is long.
         """
         own = {term.id for term in terms}
-        return any(new == name and base <= own and gain < most + WITHIN for base, name, most in self._refuted)
+        same = [
+            base for base, name, expected in self._refuted if name == new and abs(gain - expected) < WITHIN
+        ]
+        return any(base <= own for base in same)
 
     def _twins(self, term: Term) -> Iterator[Term]:
         """Yield the same error, undone, of other channels of its unit: two gauges differ, and either may be wrong."""
