@@ -34,7 +34,7 @@ FEWEST_GAPS = 4.0
 """A part that is left out is no longer than a record over this. [-]"""
 MOST = 0.5
 """Where unknown inputs act for a longer share of the time, and a channel rests on them, little bears witness. [-]"""
-PLAIN = ("unknown", "unit", "stuck")
+PLAIN = ("unit", "stuck")
 """Kinds of terms that are named all the same: a known unit is plain, also where a model follows with an input's help
 (and `nearness` sees to it that the unit is not all that explains a channel); so are equal readings. Another sign or a
 turn is not: a model that is wrong may go the other way."""
@@ -101,7 +101,7 @@ def _locks(problem: Problem, term: Term, gain: Gain | None, *, rests: bool, sett
     reasons = [f"{name} may as well act late or early" for name in _late_commands(problem, term)]
     if not settled and not _is_plain(term):
         reasons.append("the search was ended before all that is next to it was tried")
-    if rests and not _is_plain(term):
+    if rests and not _is_plain(term) and term.kind != "unknown":
         reasons.append(
             "an unknown input acts for most of the time, without which the model explains less than half of a channel"
         )

@@ -165,6 +165,17 @@ def test_a_search_that_is_ended_before_all_was_tried_next_to_its_best_explanatio
     assert stiffness.against == ("the search was ended before all that is next to it was tried",)
 
 
+@pytest.mark.parametrize("factor, named", [(1.0 / 0.3048, ["unit:b"]), (-1.0, [])])
+def test_a_search_that_is_ended_names_a_known_unit_and_no_sign(monkeypatch, factor, named):
+    """A model that is wrong may go the other way, but does not measure in feet."""
+    monkeypatch.setattr("subzero.identification.search.MOST_FITS", 2)
+    given = record(0)
+    verdict = sd.diagnose(changed(given, b=factor * given.columns["b"]), model())
+    assert not verdict.complete
+    assert ids(verdict.named) == named
+    assert ids(verdict.named + verdict.suspected) == ["unit:b"]
+
+
 def test_a_search_whose_time_is_over_before_that_names_no_cause(monkeypatch):
     """A clock that goes by one at each look; after some fits the time is over, and none is kept."""
     monkeypatch.setattr("subzero.identification.search.FOR_UNKNOWN", 0.0)
