@@ -324,12 +324,11 @@ def data_terms(model: Model) -> list[Term]:
             )
             for factor, offset, words in known
         ]
-    if len(suspects) > 1 and len(suspects) == len(model.channels):
+    every = len(suspects) == len(model.channels)
+    if every and len(suspects) > 1:
         sentence = "all channels are late or early, or the inputs early or late"
         found.append(Term(f"delay:{CLOCK}", sentence, "delay", CLOCK, PRIOR_DATA / 5.0))
-    if len(suspects) > 2 and len(suspects) == len(
-        model.channels
-    ):  # with few, a model that is too slow looks like it
+    if every and len(suspects) > 2:  # two may as well show a model that is too slow
         sentence = "the clock of all channels runs fast or slow against that of the inputs"
         found.append(Term(f"rate:{CLOCK}", sentence, "rate", CLOCK, PRIOR_DATA / 5.0))
     pairs = list(combinations(suspects, 2))

@@ -114,6 +114,7 @@ def _locks(problem: Problem, term: Term, gain: Gain | None, *, rests: bool, sett
 
 
 def _is_plain(term: Term) -> bool:
+    """Return whether no error of the model looks like a term: a unit with a factor, equal readings."""
     return term.kind in PLAIN and not (term.kind == "unit" and abs(term.factor) == 1.0)
 
 

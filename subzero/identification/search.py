@@ -70,7 +70,8 @@ FEW_CAUSES = 12
 MOST_FITS = 60
 """The search ends after so many fits, and says so."""
 FOR_UNKNOWN = 0.25
-"""Share of a search's time that is kept to compare its best explanation with unknown inputs. [-]"""
+"""Share of a search's time that is kept to compare its best explanation with unknown inputs: their ranking takes about
+a fifth of a whole search. [-]"""
 
 Key = tuple[tuple[str, float, float], ...]
 
@@ -238,7 +239,7 @@ class Search:
 
     def _fit_first(self, nominal: Linear) -> None:
         """Fit the gross errors in the data that gain most at the nominal model; where they do not explain the records,
-        and a single term is ranked higher there, fit that one with the gross errors beside it.
+        and a single term is ranked higher there, fit that one, and what gross errors there are with it.
         """
         gross = self._greedy(nominal)
         if not follows(self.problem, self._fit(gross)):
