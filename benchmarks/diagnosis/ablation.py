@@ -26,11 +26,11 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "tests" / "identification"))
 import test_unknown_input as carts
 
 RESCUES: dict[str, tuple[str, Any, str]] = {
-    "RANKED_AGAIN": ("search", 1, "the best ten are ranked again with their own noise"),
+    "RANKED_AGAIN": ("ranking", 1, "the best ten are ranked again with their own noise"),
     "FITTED": ("search", 1, "the best six are fitted"),
     "WITHIN": ("search", 0.0, "explanations near the best one are expanded, too"),
     "ONSET_GAIN": ("search", 0.0, "a cause that begins in mid-record may gain when it is fitted"),
-    "GROSS_KINDS": ("search", (), "gross errors in the data are sought at the nominal model, first"),
+    "GROSS_KINDS": ("ranking", (), "gross errors in the data are sought at the nominal model, first"),
     "TWINS": ("search", (), "an error of another channel of the unit is tried in its place"),
     "FEW_CAUSES": ("search", 0, "few causes are all fitted, whatever their rank"),
     "MANY_TERMS": ("search", 99, "unknown inputs are tried where an explanation needs many terms"),

@@ -268,7 +268,7 @@ def _budget(search: Search, best: Fit, free: Fit) -> tuple[Share, ...]:
     without which most is left, the other numbers as they are.
     """
     problem, levels = search.problem, search.problem.levels(best.terms)
-    bare = {term: search.there(free.linear, without(best.terms, term)) for term in best.terms}
+    bare = {term: search.ranking.there(free.linear, without(best.terms, term)) for term in best.terms}
     lacking = {
         term: _levels_left(problem, linear, levels) if linear else math.inf for term, linear in bare.items()
     }
@@ -332,7 +332,7 @@ def _visible_from(search: Search) -> dict[str, str]:
             or term.size
         ):
             continue
-        if (linear := search.there(base, with_term(base.terms, term), term)) is not None:
+        if (linear := search.ranking.there(base, with_term(base.terms, term), term)) is not None:
             for name, size, unit in _sizes(search.problem, linear, term):
                 found.setdefault(name, f"{size:.2g}{unit}")
     return found

@@ -20,7 +20,7 @@ from subzero.diagnosis.inference.latent_force import DRIFT, FORCE
 from subzero.identification.explanation import CLOCK, Term, kinds_of
 from subzero.identification.fit import Fit
 from subzero.identification.problem import Problem
-from subzero.identification.search import Key
+from subzero.identification.ranking import Key
 from subzero.records.consistency import MISTAKEN
 
 OF_SENSORS = {"offset": ("sensor_bias", "shift"), "scale": ("sensor_scale", "share")}
