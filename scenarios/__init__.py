@@ -26,7 +26,6 @@ problem.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -36,6 +35,7 @@ from scenarios.quantities import CONTROLS, SCHEMES
 
 if TYPE_CHECKING:
     from scenarios.instructions import Commands, Motion
+    from scenarios.reader import load
     from scenarios.trial import Profile, Start, Station, Trial, Vessel, Winch
 
 __all__ = [
@@ -57,10 +57,11 @@ __all__ = [
     "path",
 ]
 
-_HOME = dict.fromkeys(("Commands", "Motion"), "scenarios.instructions") | dict.fromkeys(
-    ("Profile", "Start", "Station", "Trial", "Vessel", "Winch"), "scenarios.trial"
-)
-"""Name → its module, which needs numpy: fetched when it is first used, so that a command line need not wait for it."""
+_HOME = {"load": "scenarios.reader"}
+_HOME |= dict.fromkeys(("Commands", "Motion"), "scenarios.instructions")
+_HOME |= dict.fromkeys(("Profile", "Start", "Station", "Trial", "Vessel", "Winch"), "scenarios.trial")
+"""Name → its module, which needs numpy or pydantic: fetched when it is first used, so that a command line need not
+wait for it."""
 
 
 def __getattr__(name: str) -> Any:
@@ -69,34 +70,6 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'scenarios' has no attribute '{name}'; it has {', '.join(__all__)}")
     value = globals()[name] = getattr(import_module(_HOME[name]), name)
     return value
-
-
-VehicleCheck = Callable[[Mapping[str, Any]], Iterable[Any]]
-
-
-def load(
-    name_or_path: str | Path,
-    *,
-    commands_csv: str | Path | None = None,
-    motion_csv: str | Path | None = None,
-    check_vehicle: VehicleCheck | None = None,
-) -> Trial:
-    """Return a shipped or a user's scenario, checked.
-
-    Args:
-        name_or_path: a name of `names`, or the path of a TOML file.
-        commands_csv: a CSV file of commands that replaces those of the scenario.
-        motion_csv: a CSV file of a motion that replaces the commands or the motion of the scenario, and what its start
-            says besides the cable.
-        check_vehicle: takes the numbers of the vehicle and gives what its own equations find wrong with them,
-            as objects with the attributes key, found, why, allowed. (This package does not depend on the vehicle.)
-
-    Raises:
-        ScenarioError: with every problem of every file.
-    """
-    from scenarios.reader import load as read  # pydantic comes only with the first file
-
-    return read(name_or_path, commands_csv=commands_csv, motion_csv=motion_csv, check_vehicle=check_vehicle)
 
 
 def names() -> list[str]:

@@ -50,7 +50,7 @@ def listed_columns(vehicle: Table) -> tuple[Quantity, ...]:
 
 
 def actuator_of(column: Quantity) -> str:
-    """Return the command that a column of listed actuators holds: its name without the unit."""
+    """Return the command that a column holds: its name without the unit."""
     return column.name.removesuffix(_SUFFIXES[column.unit])
 
 
@@ -82,14 +82,14 @@ def command_faults(listed: Sequence[str], values: np.ndarray, vehicle: Table) ->
 
 
 def written_column(column: Quantity, kind: str) -> str:
-    """Return the column of a file that a run writes which holds the ``command`` of a listed actuator, or its
-    ``state``: ``upper_port_command_deg``.
+    """Return the column of a file that a run writes which holds the ``command`` of a column of commands, or the
+    ``state`` of its actuator: ``upper_port_command_deg``.
     """
     return f"{actuator_of(column)}_{kind}{_SUFFIXES[column.unit]}"
 
 
-_SUFFIXES = {"1": "", "degree": "_deg", "m": "_m", "m3": "_m3"}
-"""Unit of a listed actuator's command → the end of its column."""
+_SUFFIXES = {"1": "", "degree": "_deg", "m": "_m", "m3": "_m3", "rev/s": "_rps"}
+"""Unit of a command → the end of its column."""
 
 
 def _tables(vehicle: Table, section: str) -> list[tuple[str, Table]]:

@@ -5,11 +5,11 @@ A problem has three parts: *what* was found and where, *why* it cannot be, and *
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from subzero.errors import SHOWN_CHARACTERS, UserError, printable
+from subzero import errors
+from subzero.errors import UserError, printable
 
 SHOWN_PROBLEMS = 10
 """So many problems are spelt out in a message: enough to go on with; more would only repeat themselves."""
@@ -66,9 +66,7 @@ class ScenarioError(UserError, ValueError):
 
 def nearest(word: str, allowed: Iterable[str]) -> str | None:
     """Return the allowed word most like `word`, whatever its case; None if none is near."""
-    by_lower = {candidate.lower(): candidate for candidate in allowed}
-    close = difflib.get_close_matches(word.lower()[:SHOWN_CHARACTERS], by_lower, n=1, cutoff=0.6)
-    return by_lower[close[0]] if close else None
+    return next(iter(errors.nearest(word, allowed, likeness=0.6)), None)
 
 
 def nearest_and_all(word: str, allowed: Iterable[str]) -> str:

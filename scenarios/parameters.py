@@ -16,7 +16,6 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +40,6 @@ from scenarios.quantities import (
     COMMANDS,
     MOTION,
     PROFILE,
-    RUN,
-    START,
     STATION,
     VESSEL,
     WATER,
@@ -50,7 +47,7 @@ from scenarios.quantities import (
     Quantity,
     by_field,
 )
-from scenarios.trial import SETPOINT, Trial
+from scenarios.trial import PLACES, RUN_FIELDS, SETPOINT, START_FIELDS, Trial
 from scenarios.vehicle_lists import OPTIONAL_SECTIONS, Leaf, optional_leaves
 from subzero.errors import real
 from subzero.errors import short as shown
@@ -119,11 +116,15 @@ def parameter(trial: Trial, name: str) -> float:
     Raises:
         ScenarioError: the trial has no such number.
     """
-    found = _known(trial).get(_list_of(name))
-    at = _at(name)
+    return float(_found(trial, name)[1][_at(name) or 0])
+
+
+def _found(trial: Trial, name: str) -> tuple[Row, np.ndarray]:
+    """Return the quantity of a number and its value or values; refuse a name that the trial does not have."""
+    found, at = _known(trial).get(_list_of(name)), _at(name)
     if found is None or (at is not None and at >= len(found[1])):
         raise ScenarioError([_unknown(trial, name)])
-    return float(found[1][at or 0])
+    return found
 
 
 def parameter_names(trial: Trial) -> tuple[str, ...]:
@@ -147,8 +148,7 @@ def parameter_values(trial: Trial, name: str) -> list[float]:
     Raises:
         ScenarioError: the trial has no such number.
     """
-    parameter(trial, name)
-    return [float(value) for value in _known(trial)[_list_of(name)][1]]
+    return [float(value) for value in _found(trial, name)[1]]
 
 
 def quantity_of(trial: Trial, name: str) -> Row:
@@ -157,8 +157,7 @@ def quantity_of(trial: Trial, name: str) -> Row:
     Raises:
         ScenarioError: the trial has no such number.
     """
-    parameter(trial, name)
-    return _known(trial)[_list_of(name)][0]
+    return _found(trial, name)[0]
 
 
 def declared_ranges(trial: Trial) -> dict[str, tuple[float, float]]:
@@ -250,18 +249,13 @@ Row = Quantity | Leaf
 """The quantity of a number: its limits, its unit."""
 
 
-@cache
-def _pattern_rows() -> dict[str, Leaf]:
-    return changeable()
-
-
 def _part_rows(trial: Trial) -> dict[str, Leaf]:
     """Return the numbers of the parts of a trial: of every vehicle and cable, and the optional sections of its own."""
     lists = {name: trial.vehicle[name] for name in OPTIONAL_SECTIONS if name in trial.vehicle}
     if not lists:
-        return _pattern_rows()
+        return changeable()
     own = optional_leaves(dict(leaves(lists)))
-    return _pattern_rows() | {f"vehicle.{key}": leaf for key, leaf in own.items()}
+    return changeable() | {f"vehicle.{key}": leaf for key, leaf in own.items()}
 
 
 def _known(trial: Trial) -> dict[str, tuple[Row, np.ndarray]]:
@@ -269,15 +263,15 @@ def _known(trial: Trial) -> dict[str, tuple[Row, np.ndarray]]:
     known: dict[str, tuple[Row, np.ndarray]] = {}
     for name, row in _part_rows(trial).items():
         known[name] = row, np.array([_part_value(trial, name)])
-    for section, owner, rows in (("run", trial, RUN), ("start", trial.start, START)):
-        for field, quantity in by_field(rows).items():
+    for section, owner, fields in (("run", trial, RUN_FIELDS), ("start", trial.start, START_FIELDS)):
+        for field, quantity in fields.items():
             known[f"{section}.{quantity.name}"] = quantity, np.array([getattr(owner, field) / quantity.scale])
     for quantity, value in zip((*WATER, *BED), (*trial.current, trial.sea_bed), strict=True):
         known[f"water.{quantity.name}"] = quantity, np.array([value])
     if trial.station is not None:
         known[f"station.{STATION[0].name}"] = STATION[0], np.array([trial.station.bandwidth])
     for section in _LISTS:
-        for quantity, column in _columns(trial, section):
+        for quantity, column in zip(_rows(trial, section), _table(trial, section).T, strict=True):
             known[f"{section}.{quantity.name}"] = quantity, column / quantity.scale
     return known
 
@@ -288,15 +282,15 @@ def _row(trial: Trial, name: str) -> tuple[Row, int] | None:
     """
     section, _, key = name.partition(".")
     if section in PARTS:
-        row = _pattern_rows().get(name) or _part_rows(trial).get(name)
+        row = changeable().get(name) or _part_rows(trial).get(name)
         return None if row is None else (row, 1)
     if section == "station" and trial.station is None:
         return None
     if section in _SINGLE and (single := _SINGLE[section].get(key)):
         return single, 1
-    for quantity, column in _columns(trial, section) if section in _LISTS else ():
+    for quantity in _rows(trial, section) if section in _LISTS else ():
         if quantity.name == key:
-            return quantity, column.size
+            return quantity, len(_table(trial, section))
     return None
 
 
@@ -380,21 +374,17 @@ def _with_key(table: Mapping[str, Any], keys: list[str], value: float) -> dict[s
 
 
 def _with_run(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
-    return _fields(RUN, own)
+    return _fields(RUN_FIELDS, own)
 
 
 def _with_start(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
-    changes: dict[str, Any] = _fields(START, own)
+    changes: dict[str, Any] = _fields(START_FIELDS, own)
     return {"start": replace(trial.start, **changes)}
 
 
-def _fields(rows: tuple[Quantity, ...], own: Mapping[str, float]) -> dict[str, float]:
+def _fields(fields: Mapping[str, Quantity], own: Mapping[str, float]) -> dict[str, float]:
     """Return values by the names of the fields that hold them, in inner units."""
-    return {
-        field: own[quantity.name] * quantity.scale
-        for field, quantity in by_field(rows).items()
-        if quantity.name in own
-    }
+    return {name: own[row.name] * row.scale for name, row in fields.items() if row.name in own}
 
 
 def _with_water(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
@@ -411,62 +401,52 @@ def _with_station(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
     return {"station": replace(changed["station"], **bandwidth)}
 
 
-def _columns(trial: Trial, section: str) -> list[tuple[Quantity, np.ndarray]]:
-    """Return the lists of a section, in inner units; none where the trial has no such section."""
+def _rows(trial: Trial, section: str) -> tuple[Quantity, ...]:
+    """Return the quantities of the lists of a section; none where the trial has no such section."""
     part = getattr(trial, _LISTS[section])
     if part is None:
-        return []
+        return ()
     if section == "motion":
-        given = ((row, getattr(part, field)) for field, row in by_field(MOTION).items())
-        return [(row, np.asarray(column)) for row, column in given if column is not None]
+        return tuple(row for name, row in by_field(MOTION).items() if getattr(part, name) is not None)
     if section == "winch":
         row = SETPOINT[part.control]
-        return [] if row is None else [(WINCH[0], np.array(part.time)), (row, np.array(part.setpoint))]
-    if section == "station":
-        columns = (part.time, *zip(*part.place, strict=True), part.heading)
-        return [(row, np.array(column)) for row, column in zip(STATION[1:], columns, strict=True)]
-    rows = {"commands": COMMANDS, "vessel": VESSEL, "water": PROFILE}[section]
+        return (WINCH[0], row) if row else ()
     if section == "commands":
         listed = {actuator_of(column): column for column in listed_columns(trial.vehicle)}
-        rows += tuple(listed[name] for name in part.listed)
-    first, *others = rows
-    table = np.asarray(part.values if section == "commands" else part.velocity, dtype=float)
-    along = part.depth if section == "water" else part.time
-    return [(first, np.asarray(along, dtype=float)), *zip(others, table.T, strict=True)]
+        return (*COMMANDS, *(listed[name] for name in part.listed))
+    return {"vessel": VESSEL, "water": PROFILE, "station": STATION[1:]}[section]
+
+
+def _places(part: Any, section: str) -> dict[str, Any]:
+    """Return the fields that hold the lists of a section → their places in the table of all of them."""
+    if section == "motion":
+        return {name: at for at, name in enumerate(("time", *part.given))}
+    return {} if section == "winch" and SETPOINT[part.control] is None else PLACES[section]
+
+
+def _table(trial: Trial, section: str) -> np.ndarray:
+    """Return the lists of a section in inner units, one row a sample, in the order of `_rows`."""
+    part = getattr(trial, _LISTS[section])
+    columns = [getattr(part, name) for name in _places(part, section)] if part is not None else []
+    return np.column_stack(columns).astype(float) if columns else np.zeros((0, 0))
 
 
 def _with_lists(section: str) -> Callable[[Trial, Mapping[str, float]], dict[str, Any]]:
     def changed(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
-        rows = [(row, np.array(column, dtype=float)) for row, column in _columns(trial, section)]
-        columns = {row.name: (row, column) for row, column in rows}
+        table, part = _table(trial, section), getattr(trial, _LISTS[section])
+        rows = {row.name: (at, row.scale) for at, row in enumerate(_rows(trial, section))}
         for name, value in own.items():
-            row, column = columns[_list_of(name)]
-            at = _at(name)
-            column[slice(None) if at is None else at] = value * row.scale
-        part = getattr(trial, _LISTS[section])
-        return {_LISTS[section]: replace(part, **_part_fields(section, part, [each for _, each in rows]))}
+            (column, scale), at = rows[_list_of(name)], _at(name)
+            table[slice(None) if at is None else at, column] = value * scale
+        fields = {name: table[:, place] for name, place in _places(part, section).items()}
+        return {_LISTS[section]: replace(part, **fields)}
 
     return changed
 
 
-def _part_fields(section: str, part: Any, columns: list[np.ndarray]) -> dict[str, Any]:
-    """Return the fields of the lists of a section, from its columns in the order of `_columns`."""
-    first, *others = columns
-    if section == "motion":
-        names = [name for name in by_field(MOTION) if getattr(part, name) is not None]
-        return dict(zip(names, columns, strict=True))
-    if section == "winch":
-        return {"time": first, "setpoint": others[0]}
-    if section == "station":
-        return {"time": first, "place": np.column_stack(others[:3]), "heading": others[3]}
-    table = np.column_stack(others)
-    along = {"water": "depth"}.get(section, "time")
-    return {along: first, "values" if section == "commands" else "velocity": table}
-
-
 _SINGLE: dict[str, dict[str, Quantity]] = {
-    "run": {row.name: row for row in RUN},
-    "start": {row.name: row for row in START},
+    "run": {row.name: row for row in RUN_FIELDS.values()},
+    "start": {row.name: row for row in START_FIELDS.values()},
     "water": {row.name: row for row in (*WATER, *BED)},
     "station": {STATION[0].name: STATION[0]},
 }

@@ -281,6 +281,7 @@ def nested(values: Mapping[str, float]) -> dict[str, Any]:
     return tables
 
 
+@cache
 def changeable() -> dict[str, Leaf]:
     """Return every key that [changes] may hold, with the number of the pattern that it stands for."""
     vehicle = {f"vehicle.{key}": leaf for key, leaf in leaves(pattern("vehicle").table)}
@@ -305,8 +306,8 @@ def _numbers_by_key(
     """Return the numbers of a section whose keys are those of vehicle and cable, and the problems."""
     raw = source.table.get(section, {})
     given = dict(_flat(raw)) if isinstance(raw, Mapping) else {}
-    allowed = changeable() if given else {}
-    allowed |= {f"vehicle.{key}": leaf for key, leaf in optional_leaves(_of_vehicle(given)).items()}
+    own = optional_leaves(_of_vehicle(given))
+    allowed = (changeable() if given else {}) | {f"vehicle.{key}": leaf for key, leaf in own.items()}
     found: dict[str, float] = {}
     problems = []
     for key, value in given.items():

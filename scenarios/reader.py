@@ -7,7 +7,6 @@ water moves the same everywhere.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -15,12 +14,23 @@ from math import remainder, tau
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from scenarios.command_columns import command_columns, listed_columns
 from scenarios.errors import Problem, ScenarioError
 from scenarios.files import Source, find
 from scenarios.instructions import Motion
 from scenarios.parts import Part, nested, read_changes, read_part, read_tolerances
-from scenarios.quantities import PROFILE, RUN, SCHEMES, SECTIONS, START, WINCH, by_field
+from scenarios.quantities import (
+    PROFILE,
+    SCHEMES,
+    SECTIONS,
+    STATION,
+    VESSEL,
+    WATER,
+    WINCH,
+    Quantity,
+)
 from scenarios.samples import LEFT_OPEN, check_times, commands, inline, motion, read_instructions
 from scenarios.schema import LISTS, check_page, check_section
 from scenarios.steps import misfits
@@ -29,6 +39,10 @@ from scenarios.trial import (
     FOUND_WHY,
     ONLY_DEFAULT,
     ONLY_DEFAULT_CABLE,
+    PLACES,
+    RUN_FIELDS,
+    SETPOINT,
+    START_FIELDS,
     TRIM_NEEDS_SPEED,
     Profile,
     Start,
@@ -44,10 +58,6 @@ Found = TypeVar("Found")
 
 VehicleCheck = Callable[[Mapping[str, Any]], Iterable[Any]]
 """Takes the numbers of a vehicle; gives complaints with the attributes key, found, why, allowed."""
-
-CURRENT = ("current_north_m_s", "current_east_m_s", "current_down_m_s")
-SETPOINT = {"pay_out_rate": "pay_out_rate_m_s", "constant_tension": "tension_N", "brake": ""}
-"""Control of a winch → the list that it follows."""
 
 Read = tuple[dict[str, Any], list[Problem]]
 """Fields of a `Trial`, and the problems; fields are only good without problems."""
@@ -94,7 +104,9 @@ def load(
     reading.problems.extend(check_page(reading.source))
     run, start = (reading.section(name) for name in ("run", "start"))
     reading.problems.extend(check_steps(reading.source, run, start))
-    around = reading.keep(read_surroundings(reading.source))
+    around: dict[str, Any] = {}
+    for read in (_read_water, _read_winch, _read_vessel, _read_station):
+        around |= reading.keep(read(reading.source))
     vehicle, cable, tolerances = _parts(reading, check_vehicle)
     reading.problems.extend(check_scheme(reading.source, run, cable.get("cable", {})))
     given = {
@@ -114,16 +126,7 @@ def load(
         description=reading.source.table["description"],
         text=reading.source.text,
         source=printable(str(name_or_path)),
-        duration=run["duration_s"],
-        hull_step=run["hull_step_s"],
-        cable_step=run["cable_step_s"],
-        segment_length=run["segment_length_m"],
-        grading=run["grading"],
-        far_length=run["far_length_m"],
-        far_grading=run["far_grading"],
-        every=run["every_s"],
-        rtol=run["rtol"],
-        budget=run["budget_s"],
+        **{name: run[quantity.name] for name, quantity in RUN_FIELDS.items()},
         scheme=run["scheme"],
         start=_start(start, prescribed),
         vehicle=vehicle,
@@ -190,7 +193,7 @@ def check_trim(source: Source, start: Mapping[str, Any]) -> list[Problem]:
     table = source.table.get("start", {})
     if not start.get("at_trim", False) or not isinstance(table, Mapping):
         return []
-    names = [by_field(START)[name].name for name in FOUND_BY_TRIM]
+    names = [START_FIELDS[name].name for name in FOUND_BY_TRIM]
     problems = [
         source.problem(f"start.{name}", FOUND_WHY, "Leave it out.", found=table[name])
         for name in names
@@ -206,10 +209,10 @@ def check_trim(source: Source, start: Mapping[str, Any]) -> list[Problem]:
 
 def _start(start: Mapping[str, Any], prescribed: Motion | None) -> Start:
     """Return the start; a prescribed motion starts where it says."""
-    fields = {name: start[quantity.name] * quantity.scale for name, quantity in by_field(START).items()}
+    fields = {name: start[quantity.name] * quantity.scale for name, quantity in START_FIELDS.items()}
     if prescribed is None:
         return Start(**fields, at_trim=start["at_trim"])
-    left_open = {name: value for name, value in fields.items() if by_field(START)[name].name in LEFT_OPEN}
+    left_open = {name: value for name, value in fields.items() if START_FIELDS[name].name in LEFT_OPEN}
     said = {name: float(getattr(prescribed, name)[0]) for name in prescribed.given if name in fields}
     for angle in ("heading", "roll"):
         said[angle] = remainder(said.get(angle, 0.0), tau)
@@ -224,7 +227,7 @@ def check_steps(source: Source, run: Mapping[str, float], start: Mapping[str, fl
         run: numbers of the section [run], without those that are wrong.
         start: numbers of the section [start], likewise.
     """
-    keys = {field: quantity.name for field, quantity in by_field(RUN + START).items()}
+    keys = {field: quantity.name for field, quantity in (RUN_FIELDS | START_FIELDS).items()}
     given = {**run, **start}
     numbers = {field: given[key] for field, key in keys.items() if key in given}
     return [
@@ -233,15 +236,20 @@ def check_steps(source: Source, run: Mapping[str, float], start: Mapping[str, fl
     ]
 
 
-def read_surroundings(source: Source) -> Read:
-    """Read [water], [winch] and [vessel] of a trial."""
-    fields: dict[str, Any] = {}
-    problems: list[Problem] = []
-    for read in (_read_water, _read_winch, _read_vessel, _read_station):
-        found, wrong = read(source)
-        fields |= found
-        problems += wrong
-    return fields, problems
+def _read_lists(
+    source: Source, section: str, left_out: Mapping[str, list[float]] | None = None
+) -> tuple[dict[str, Any], dict[str, list[float]], list[Problem]]:
+    """Return the values of a section over time, those of its lists that are given, and the problems.
+
+    Args:
+        source: the trial file, which has the section.
+        section: its name.
+        left_out: lists that are taken where the file gives none.
+    """
+    values, problems = check_section(source, section, source.table[section])
+    lists = {**(left_out or {}), **_lists(values, section)}
+    samples, wrong = inline(source, section, lists)
+    return values, lists, problems + wrong + (check_times(samples, None) if samples else [])
 
 
 def _lists(values: Mapping[str, Any], section: str) -> dict[str, list[float]]:
@@ -250,26 +258,23 @@ def _lists(values: Mapping[str, Any], section: str) -> dict[str, list[float]]:
     return {name: values[name] for name in names if values.get(name) is not None}
 
 
-def _vectors(lists: Mapping[str, list[float]], names: list[str], count: int) -> tuple[Any, ...]:
-    """Return three lists as `count` vectors; a list that is left out is zero."""
-    columns = [lists.get(name, [0.0] * count) for name in names]
-    return tuple(tuple(float(x) for x in row) for row in zip(*columns, strict=False))
+def _fields(section: str, rows: tuple[Quantity, ...], lists: Mapping[str, list[float]]) -> dict[str, Any]:
+    """Return the fields of the value of a section, in inner units; a list that is left out is zero."""
+    zeros = [0.0] * len(lists[rows[0].name])
+    table = np.column_stack([np.array(lists.get(row.name, zeros)) * row.scale for row in rows])
+    return {name: table[:, place] for name, place in PLACES[section].items()}
 
 
 def _read_water(source: Source) -> Read:
     """Return the uniform current, and the profile that is added to it by depth."""
     values, problems = check_section(source, "water", source.table.get("water", {}))
-    current = tuple(float(values.get(name, 0.0)) for name in CURRENT)
+    current = tuple(float(values.get(quantity.name, 0.0)) for quantity in WATER)
     fields = {"current": current, "sea_bed": float(values.get("sea_bed_m", 0.0))}
     lists = _lists(values, "water")
-    if not lists:
+    problems += _check_profile(source, lists) if lists else []
+    if problems or not lists:
         return fields, problems
-    problems += _check_profile(source, lists)
-    if problems:
-        return fields, problems
-    names = [quantity.name for quantity in PROFILE[1:]]
-    depth = tuple(float(x) for x in lists["depth_m"])
-    return fields | {"profile": Profile(depth=depth, velocity=_vectors(lists, names, len(depth)))}, []
+    return fields | {"profile": Profile(**_fields("water", PROFILE, lists))}, []
 
 
 def _check_profile(source: Source, lists: Mapping[str, list[float]]) -> list[Problem]:
@@ -278,22 +283,11 @@ def _check_profile(source: Source, lists: Mapping[str, list[float]]) -> list[Pro
     if "depth_m" not in given:
         why = "[water] does not say at which depths"
         return [source.problem(f"water.{name}", why, "Add depth_m, from top to bottom.") for name in lists]
-    if not any(name in given for name in (quantity.name for quantity in PROFILE[1:])):
+    if not any(quantity.name in given for quantity in PROFILE[1:]):
         why = "[water] does not say how the water moves there"
         return [source.problem("water.depth_m", why, "Add profile_north_m_s, profile_east_m_s, or both.")]
-    depth = lists.get("depth_m")
-    if depth is None:
-        return []  # a problem of its own has been reported
-    problems = [
-        source.problem(
-            f"water.{name}",
-            f"this list has {len(values)} and depth_m has {len(depth)} values",
-            "Give one value for each depth.",
-        )
-        for name, values in lists.items()
-        if len(values) != len(depth)
-    ]
-    for at, (above, below) in enumerate(pairwise(depth), start=1):
+    _, problems = inline(source, "water", lists, "depth_m")
+    for at, (above, below) in enumerate(pairwise(lists.get("depth_m", [])), start=1):
         if not below > above:
             why, remedy = f"the depth before it is {above:g}", "Depths must increase from top to bottom."
             problems.append(source.problem(f"water.depth_m[{at}]", why, remedy, found=below))
@@ -304,32 +298,27 @@ def _read_winch(source: Source) -> Read:
     """Return the winch or the free drum."""
     if "winch" not in source.table:
         return {}, []
-    values, problems = check_section(source, "winch", source.table["winch"])
-    lists = _lists(values, "winch")
+    values, lists, problems = _read_lists(source, "winch")
     if "control" not in values:
         return {}, problems  # `check_page` or `check_section` has said so
     control = values["control"]
     problems += _check_control(source, control, lists)
-    samples, wrong = inline(source, "winch", lists)
-    problems += wrong
-    if samples:
-        problems += check_times(samples, None)
     if problems:
         return {}, problems
-    time, setpoint = (tuple(float(x) for x in lists.get(name, [])) for name in ("time_s", SETPOINT[control]))
-    return {"winch": Winch(control=control, time=time, setpoint=setpoint)}, []
+    row = SETPOINT[control]
+    return {"winch": Winch(control=control, **(_fields("winch", (WINCH[0], row), lists) if row else {}))}, []
 
 
 def _check_control(source: Source, control: str, lists: Mapping[str, list[float]]) -> list[Problem]:
     """Return which lists of a winch are missing, or say nothing with its kind of control."""
-    given, wanted = source.table["winch"], ["time_s", SETPOINT[control]] if SETPOINT[control] else []
-    limits = {quantity.name: quantity.allowed for quantity in WINCH}
+    row = SETPOINT[control]
+    wanted = {quantity.name: quantity.allowed for quantity in ((WINCH[0], row) if row else ())}
     problems = [
-        source.problem(f"winch.{name}", f'a winch with control = "{control}" needs this list', limits[name])
-        for name in wanted
-        if name not in given
+        source.problem(f"winch.{name}", f'a winch with control = "{control}" needs this list', allowed)
+        for name, allowed in wanted.items()
+        if name not in source.table["winch"]
     ]
-    users = {name: kind for kind, name in SETPOINT.items() if name}
+    users = {quantity.name: kind for kind, quantity in SETPOINT.items() if quantity}
     for name in lists:
         if name not in wanted:
             other = f', or set control = "{users[name]}"' if name in users else ""
@@ -342,41 +331,25 @@ def _read_vessel(source: Source) -> Read:
     """Return how the drum moves."""
     if "vessel" not in source.table:
         return {}, []
-    values, problems = check_section(source, "vessel", source.table["vessel"])
-    lists = _lists(values, "vessel")
-    samples, wrong = inline(source, "vessel", lists)
-    if samples is None:
-        return {}, problems + wrong
-    problems += wrong + check_times(samples, None)
-    if problems:
+    values, lists, problems = _read_lists(source, "vessel")
+    if problems or not values:  # `check_page` has said that it is no section
         return {}, problems
-    names = ["velocity_north_m_s", "velocity_east_m_s", "velocity_down_m_s"]
-    time = tuple(float(x) for x in samples.time)
-    return {"vessel": Vessel(time=time, velocity=_vectors(lists, names, len(time)))}, []
+    return {"vessel": Vessel(**_fields("vessel", VESSEL, lists))}, []
 
 
 def _read_station(source: Source) -> Read:
     """Return the station that thrusters keep; it stands in place of commands."""
     if "station" not in source.table:
         return {}, []
-    values, problems = check_section(source, "station", source.table["station"])
+    values, lists, problems = _read_lists(source, "station", {"time_s": [0.0]})
     if "motion" in source.table or "commands" in source.table:
         why = "[commands] or [motion] is given too, and thrusters keep this station"
-        return {}, [
-            *problems,
-            source.problem("station", why, "Keep one of [station], [commands] and [motion]."),
-        ]
-    lists = _lists(values, "station")
-    lists.setdefault("time_s", [0.0])
-    samples, wrong = inline(source, "station", lists)
-    problems += wrong + (check_times(samples, None) if samples else [])
-    if problems or samples is None:
+        remedy = "Keep one of [station], [commands] and [motion]."
+        problems.append(source.problem("station", why, remedy))
+    if problems or not values:
         return {}, problems
-    time = tuple(float(x) for x in samples.time)
-    heading = [math.radians(x) for x in lists.get("heading_deg", [0.0] * len(time))]
-    place = _vectors(lists, ["north_m", "east_m", "depth_m"], len(time))
-    bandwidth = float(values["bandwidth_rad_s"])
-    return {"station": Station(time=time, place=place, heading=tuple(heading), bandwidth=bandwidth)}, []
+    fields = _fields("station", STATION[1:], lists)
+    return {"station": Station(**fields, bandwidth=float(values["bandwidth_rad_s"]))}, []
 
 
 def check_scheme(source: Source, run: Mapping[str, Any], cable: Mapping[str, float]) -> list[Problem]:

@@ -57,17 +57,6 @@ LONGEST_HOLD = 1.0
 NUMERICAL = 1e-9
 """Times that differ by less than this are the same: decimal fractions are not exact in binary. [s]"""
 
-WRITTEN: dict[str, dict[str, str]] = {
-    "commands": {
-        "propeller_command_rps": "propeller_rps",
-        "rudder_command_deg": "rudder_deg",
-        "stern_plane_port_command_deg": "stern_plane_port_deg",
-        "stern_plane_starboard_command_deg": "stern_plane_starboard_deg",
-    },
-    "motion": {},
-}
-"""Section → the column of a file that a run writes → the column of the section that it is."""
-
 Rows = tuple[Quantity, ...]
 """Columns that a section may have."""
 
@@ -189,17 +178,19 @@ def _read_kind(source: Source, kind: str, given: Given, rows: Rows) -> tuple[Sam
 
 
 def inline(
-    source: Source, section: str, columns: Mapping[str, list[float]]
+    source: Source, section: str, columns: Mapping[str, list[float]], first: str = "time_s"
 ) -> tuple[Samples | None, list[Problem]]:
-    """Return the lists of a section as samples, None if there are no times; and those of a wrong length."""
-    key = f"{section}.time_s"
-    if "time_s" not in columns:
+    """Return the lists of a section as samples, None if there are no times; and those that are not as long as the
+    first list.
+    """
+    key = f"{section}.{first}"
+    if first not in columns:
         return None, []
-    count = len(columns["time_s"])
-    remedy = "Give one value for each time."
+    count = len(columns[first])
+    remedy = f"Give one value for each {first.partition('_')[0]}."
     problems = [
         source.problem(
-            f"{section}.{name}", f"this list has {len(values)} and time_s has {count} values", remedy
+            f"{section}.{name}", f"this list has {len(values)} and {first} has {count} values", remedy
         )
         for name, values in columns.items()
         if len(values) != count
@@ -333,10 +324,11 @@ def read_csv(
         (line, given), cells = _table(read_text(path, name, MOST_OF_A_CSV), name)
     except ScenarioError as error:
         return None, list(error.problems)
-    listed = [row for row in wanted if row.name not in (fixed.name for fixed in SECTIONS[section])]
-    written = WRITTEN[section] | {written_column(row, "command"): row.name for row in listed}
+    commanded = wanted[1:] if section == "commands" else ()
+    written = {written_column(row, "command"): row.name for row in commanded}
     header = line, [written.get(column, column) for column in given]
     columns, problems = _columns(name, header[1], cells, wanted)
+    listed = wanted[len(SECTIONS[section]) :]
     passed_over = [*BY_COLUMN, *(written_column(row, "state") for row in listed)]
     problems += _header_problems(name, header, wanted, passed_over)
     problems += _shape_problems(name, header[1], cells)

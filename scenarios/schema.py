@@ -29,24 +29,10 @@ CHOICES = {
 """Keys that hold one of some words → why another cannot be, and the words."""
 
 
-class Page(BaseModel):
-    """A whole trial file; the contents of the sections are checked by `check_section`."""
-
-    model_config = STRICT
-
-    description: str
-    vehicle: str
-    cable: str
-    run: dict[str, Any] = {}
-    start: dict[str, Any] = {}
-    water: dict[str, Any] = {}
-    winch: dict[str, Any] = {}
-    vessel: dict[str, Any] = {}
-    station: dict[str, Any] = {}
-    commands: dict[str, Any] = {}
-    motion: dict[str, Any] = {}
-    changes: dict[str, Any] = {}
-    tolerances: dict[str, Any] = {}
+PAGE_FIELDS: dict[str, Any] = dict.fromkeys(("description", "vehicle", "cable"), (str, ...))
+PAGE_FIELDS |= dict.fromkeys((*SECTIONS, "changes", "tolerances"), (dict[str, Any], {}))
+Page = create_model("Page", __config__=STRICT, **PAGE_FIELDS)
+"""A whole trial file; the contents of the sections are checked by `check_section`."""
 
 
 class FileReference(BaseModel):

@@ -322,9 +322,10 @@ def _factors(source: Source, given: Given) -> tuple[dict[str, float], dict[str, 
     factors |= _ends(given, long, wide, factors)
     old, new = (moments(_hull(given, grown)) for grown in ({}, factors))
     volume, turned = (dense * new[i] / old[i] for i in (0, 2))
-    by_name = {"surge": volume, "sway": volume, "heave": volume, "pitch": turned, "yaw": turned}
-    for (name, f), k in zip(by_name.items(), _in_turn(*(now / then for now, then in lamb)), strict=True):
-        factors[f"added_mass.{name}"] = f * k
+    k1, k2, k_turned = (now / then for now, then in lamb)
+    factors["added_mass.surge"] = volume * k1
+    factors |= dict.fromkeys(("added_mass.sway", "added_mass.heave"), volume * k2)
+    factors |= dict.fromkeys(("added_mass.pitch", "added_mass.yaw"), turned * k_turned)
     lift = given.said("buoyancy.net_buoyancy")
     lift = volume * given.before("buoyancy.net_buoyancy") if lift is None else lift
     factors["buoyancy.net_buoyancy"] = volume
@@ -340,11 +341,6 @@ def _factors(source: Source, given: Given) -> tuple[dict[str, float], dict[str, 
     added = {f"{key}_x": moved for key in ("rigid_body.centre_of_gravity", "buoyancy.centre_of_buoyancy")}
     added |= {"added_mass.sway_yaw": coupled, "added_mass.heave_pitch": -coupled}
     return factors | _drive(source, given, factors), added
-
-
-def _in_turn(k1: float, k2: float, turned: float) -> tuple[float, ...]:
-    """Return Lamb's factors in the order surge, sway, heave, pitch, yaw."""
-    return k1, k2, k2, turned, turned
 
 
 def _spread(m: tuple[float, float, float, float]) -> float:

@@ -33,6 +33,7 @@ from scenarios.quantities import (
     VESSEL,
     WATER,
     WINCH,
+    Quantity,
     by_field,
 )
 from scenarios.steps import even_times, misfits, run_times
@@ -41,6 +42,15 @@ from subzero.files.text_repr import Overview, shown
 
 SETPOINT = dict(zip(CONTROLS, (*WINCH[1:], None), strict=True))
 """Control of a winch → the quantity that it follows."""
+
+PLACES: dict[str, dict[str, int | slice]] = {
+    "commands": {"time": 0, "values": slice(1, None)},
+    "winch": {"time": 0, "setpoint": 1},
+    "vessel": {"time": 0, "velocity": slice(1, None)},
+    "station": {"time": 0, "place": slice(1, 4), "heading": 4},
+    "water": {"depth": 0, "velocity": slice(1, None)},
+}
+"""Section → the fields of its value that hold its lists → the places of these lists in the table of quantities."""
 
 ONLY_DEFAULT_CABLE = ("tangential_added_mass_coefficient", "internal_damping", "bending_stiffness")
 """Numbers of a cable that only the default scheme knows."""
@@ -170,13 +180,7 @@ class Profile:
 
     def __post_init__(self) -> None:
         """Raise an error if the fields do not form a profile."""
-        check = Checks(self)
-        depth = check.rows("depth", PROFILE[:1])
-        velocity = check.rows("velocity", PROFILE[1:], None if depth is None else depth.size)
-        if depth is not None:
-            check.increasing("depth", depth, "Depths", None)
-        check.refuse()
-        _keep(self, depth=_tuples(depth), velocity=_tuples(velocity))
+        _keep_lists(self, Checks(self), "water", PROFILE, what="Depths", first=None)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -200,15 +204,11 @@ class Winch:
             check.say("control", "a winch cannot do this", f"Allowed: {', '.join(CONTROLS)}.", self.control)
             check.refuse()
         quantity = SETPOINT[self.control]
-        if quantity is None:
-            _keep(self, time=(), setpoint=())
+        if quantity is not None:
+            _keep_lists(self, check, "winch", (WINCH[0], quantity))
             return
-        time = check.rows("time", WINCH[:1])
-        setpoint = check.rows("setpoint", (quantity,), None if time is None else time.size)
-        if time is not None:
-            check.increasing("time", time)
-        check.refuse()
-        _keep(self, time=_tuples(time), setpoint=_tuples(setpoint))
+        for name in PLACES["winch"]:
+            object.__setattr__(self, name, ())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -225,13 +225,7 @@ class Vessel:
 
     def __post_init__(self) -> None:
         """Raise an error if the fields do not form a vessel."""
-        check = Checks(self)
-        time = check.rows("time", VESSEL[:1])
-        velocity = check.rows("velocity", VESSEL[1:], None if time is None else time.size)
-        if time is not None:
-            check.increasing("time", time)
-        check.refuse()
-        _keep(self, time=_tuples(time), velocity=_tuples(velocity))
+        _keep_lists(self, Checks(self), "vessel", VESSEL)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -254,26 +248,33 @@ class Station:
         """Raise an error if the fields do not form a station."""
         check = Checks(self)
         check.number("bandwidth", STATION[0])
-        time = check.rows("time", STATION[1:2])
-        count = None if time is None else time.size
-        place = check.rows("place", STATION[2:5], count)
-        heading = check.rows("heading", STATION[5:], count)
-        if time is not None:
-            check.increasing("time", time)
-        check.refuse()
-        _keep(self, time=_tuples(time), place=_tuples(place), heading=_tuples(heading))
+        _keep_lists(self, check, "station", STATION[1:])
 
 
-def _tuples(array: np.ndarray | None) -> Any:
-    """Return an array as a tuple, of tuples if it has two axes."""
-    rows = [] if array is None else array.tolist()
-    return tuple(tuple(row) if isinstance(row, list) else row for row in rows)
+def _keep_lists(
+    value: Any, check: Checks, section: str, rows: tuple[Quantity, ...], **increasing: Any
+) -> None:
+    """Check the lists of a value that is being made, of which the first increases, and keep them as tuples.
 
-
-def _keep(value: Any, **fields: Any) -> None:
-    """Set fields of a frozen value that is being made."""
-    for name, each in fields.items():
-        object.__setattr__(value, name, each)
+    Args:
+        value: of a section of `PLACES`.
+        check: its checks, which are refused here.
+        section: its name.
+        rows: the quantities of its lists.
+        increasing: how the first one increases, see `Checks.increasing`.
+    """
+    first, *others = PLACES[section].items()
+    main = check.rows(first[0], rows[:1])
+    arrays = {first[0]: main}
+    for name, place in others:
+        own = rows[place] if isinstance(place, slice) else (rows[place],)
+        arrays[name] = check.rows(name, own, None if main is None else main.size)
+    if main is not None:
+        check.increasing(first[0], main, **increasing)
+    check.refuse()
+    for name, array in arrays.items():
+        listed = [] if array is None else array.tolist()
+        object.__setattr__(value, name, tuple(tuple(x) if isinstance(x, list) else x for x in listed))
 
 
 @shown
