@@ -18,7 +18,7 @@ C(ν)           Coriolis matrix of a mass matrix                  Kirchhoff     
 W, B, r_B      weight, buoyancy and its centre       N, m        (r_G W − r_B B) × k           restoring
 Y_uv, N_ur …   lift of the hull per surge speed      kg/m …      Y_uv |u| v + …                body_lift
 C_d            cross-flow drag coefficient           1           −½ρ C_d 2R |V| V dx           cross_flow
-C_D            axial drag coefficient                1           −½ρ(π/4)D² C_D u|u|           axial_drag
+C_D            axial drag coefficient                1           −½ρ(π/4)D² C_D u|u|           damping
 K_p, Y_vv …    further damping                       kg m2/s …   D ν, D ν|ν|                   damping
 n, T, Q        shaft speed, thrust, torque           rev/s, N    ρD⁴ K_T(J) n², ρD⁵ K_Q(J) n²  propeller
 w, t           wake fraction, thrust deduction       1           u_a = (1 − w) u, (1 − t) T    propeller

@@ -90,7 +90,5 @@ def add_engines(
         out[5] += engine.x * Y - engine.y * X
 
 
-NO_ENGINE = BuoyancyEngine(
-    x=0.0, y=0.0, z=0.0, least_volume=0.0, most_volume=0.0, pump_rate=1.0, lag=0.0, lost_command=0.0
-).numbers(0, 0.0)
+NO_ENGINE = EngineNumbers(0, 0.0, 0.0, 0.0, 0.0)
 """Fills the compiled list behind the last engine."""

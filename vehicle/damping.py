@@ -1,20 +1,36 @@
-"""Further damping of the hull, for what strips, lift and drag leave out: linear, and quadratic by component.
+"""Drag of the hull along its axis, and further damping, for what that, strips and lift leave out: linear, and quadratic
+by component.
 
+    X = −½ ρ (π/4) D² C_D u |u|                                        (Hoerner 1965, on frontal area)
     F_i = D_i ν_i,      e.g.  K = K_p p                                 (linear)
     Y = Y_vv v|v| + Y_rr r|r|,   N = N_vv v|v| + N_rr r|r|, …           (quadratic; SNAME)
 
-Subzero II uses the quadratic roll term only; everything else is zero there and switched off exactly. Vehicles
-known by such tables (REMUS 100, LAUV) put their numbers here instead of, or in addition to, the cross-flow strips.
+The axial drag is friction, form, joints and screws together; the profile drag of the fins is theirs (`fins`). Of
+further damping Subzero II uses the quadratic roll term only; everything else is zero there and switched off exactly.
+Vehicles known by such tables (REMUS 100, LAUV) put their numbers here instead of, or in addition to, the cross-flow
+strips.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from subzero.jit import inlined
 from vehicle.parameters import Section, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class AxialDrag(Section):
+    """Axial drag of the hull without fins."""
+
+    drag_coefficient: float = parameter("axial drag coefficient on frontal area, C_D", "1", low=0.0)
+
+    def numbers(self, diameter: float, density: float) -> float:
+        """Return −X_uu = ½ρ(π/4)D² C_D [kg/m]."""
+        return density * math.pi / 8.0 * diameter**2 * self.drag_coefficient
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,6 +66,14 @@ class QuadraticDamping(Section):
     def numbers(self) -> np.ndarray:
         """Return Y_vv, Y_rr, N_vv, N_rr, Z_ww, Z_qq, M_ww, M_qq, K_pp."""
         return np.array(self.values())
+
+
+@inlined
+def axial_drag(nu_r: np.ndarray, quadratic: float, out: np.ndarray) -> None:
+    """Fill out (6,) with the axial drag [N]; `quadratic` is −X_uu [kg/m], nu_r relative to the water."""
+    out[0] = -quadratic * nu_r[0] * abs(nu_r[0])
+    for i in range(1, 6):
+        out[i] = 0.0
 
 
 @inlined

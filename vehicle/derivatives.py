@@ -166,17 +166,16 @@ class Derivatives:
             for name, value in self.derivatives
         ]
 
-    def added_mass(self, density: float, length: float) -> np.ndarray:
-        """M_A (6, 6), of the derivatives alone. [kg, kg m, kg m2]"""
-        return -self._matrix("added_mass", self.with_dimensions(density, length))
+    def matrix(self, kind: str, density: float, length: float) -> np.ndarray:
+        """Return the matrix (6, 6) of a kind, of the derivatives alone: M_A, D or Q, in SI units.
 
-    def linear(self, density: float, length: float) -> np.ndarray:
-        """D (6, 6). [kg/s, kg m/s, kg m2/s]"""
-        return self._matrix("linear", self.with_dimensions(density, length))
-
-    def quadratic(self, density: float, length: float) -> np.ndarray:
-        """Q (6, 6). [kg/m, kg, kg m, kg m2]"""
-        return self._matrix("quadratic", self.with_dimensions(density, length))
+        Args:
+            kind: "added_mass", "linear" or "quadratic".
+            density: ρ of the water. [kg/m3]
+            length: L of the hull. [m]
+        """
+        matrix = self._matrix(kind, self.with_dimensions(density, length))
+        return -matrix if kind == "added_mass" else matrix
 
     def _matrix(self, kind: str, rows: list[tuple[DerivativeName, float]]) -> np.ndarray:
         matrix = np.zeros((6, 6))

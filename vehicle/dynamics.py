@@ -49,14 +49,6 @@ def relative_velocity(state: np.ndarray, R: np.ndarray, current_n: np.ndarray, n
         nu_r[3 + i] = state[10 + i]
 
 
-@compiled
-def surge_through_water(state: np.ndarray, current_n: np.ndarray) -> float:
-    """Return u_r, the forward speed through the water [m/s]."""
-    R = scratch(3, 3)
-    rotation(state[3:7], R)
-    return state[7] - (R[0, 0] * current_n[0] + R[1, 0] * current_n[1] + R[2, 0] * current_n[2])
-
-
 @gated_inlined
 def deflections(
     state: np.ndarray, command: np.ndarray, numbers: VehicleNumbers
@@ -206,10 +198,12 @@ def battery_voltage(
     state: np.ndarray, command: np.ndarray, current_n: np.ndarray, numbers: VehicleNumbers
 ) -> float:
     """Return the battery voltage under load [V]."""
-    u = surge_through_water(state, current_n)
+    R, nu_r = scratch(3, 3), scratch(1, 6)[0]
+    rotation(state[3:7], R)
+    relative_velocity(state, R, current_n, nu_r)
     motor, propeller = numbers.motor, numbers.propeller
-    n = shaft_speed(state[SHAFT], state[CHARGE], command[0], u, motor, propeller)
-    return voltage(state[CHARGE], battery_current(n, u, motor, propeller), motor)
+    n = shaft_speed(state[SHAFT], state[CHARGE], command[0], nu_r[0], motor, propeller)
+    return voltage(state[CHARGE], battery_current(n, nu_r[0], motor, propeller), motor)
 
 
 @compiled

@@ -140,10 +140,5 @@ def add_fins(
         out[5] += x * Y - y * X
 
 
-NO_FIN = Fin(
-    **dict.fromkeys(("x", "y", "z", "span_angle", "rudder_share", "plane_share", "roll_share"), 0.0),
-    **dict.fromkeys(("lag", "offset", "deflection_limit", "lost_command"), 0.0),
-    **dict.fromkeys(("area", "lift_slope", "profile_drag_coefficient", "normal_force_coefficient"), 0.0),
-    **dict.fromkeys(("aspect_ratio", "span_efficiency", "stall_angle", "rate_limit"), 1.0),
-).numbers(0, 0.0)
+NO_FIN = Fin(**dict.fromkeys(Fin.__dataclass_fields__, 1.0)).numbers(0, 0.0)
 """Fills the compiled list behind the last fin."""

@@ -32,20 +32,6 @@ class FreeRun(NamedTuple):
 
 
 @compiled
-def rates(
-    y: np.ndarray,
-    command: np.ndarray,
-    current_n: np.ndarray,
-    wrench_b: np.ndarray,
-    numbers: VehicleNumbers,
-    out: np.ndarray,
-) -> None:
-    """Fill out with the rates of y, the state and behind it the works."""
-    n = y.size - WORKS
-    derivative_and_power(y[:n], command, current_n, wrench_b, numbers, out[:n], out[n:])
-
-
-@compiled
 def rk4_step(
     y: np.ndarray,
     step: float,
@@ -57,17 +43,19 @@ def rk4_step(
     stage: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Fill out with y one step later [s]; k (4, entries of y) and stage are scratch."""
-    size = y.size
-    rates(y, command, current_n, wrench_b, numbers, k[0])
+    """Fill out with y, the state and behind it the works, one step later [s]; k (4, entries of y) and stage are
+    scratch.
+    """
+    size, n = y.size, y.size - WORKS
+    derivative_and_power(y[:n], command, current_n, wrench_b, numbers, k[0, :n], k[0, n:])
     for i in range(1, 4):
         part = step if i == 3 else 0.5 * step
         for j in range(size):
             stage[j] = y[j] + part * k[i - 1, j]
-        rates(stage, command, current_n, wrench_b, numbers, k[i])
+        derivative_and_power(stage[:n], command, current_n, wrench_b, numbers, k[i, :n], k[i, n:])
     for j in range(size):
         out[j] = y[j] + step / 6.0 * (k[0, j] + 2.0 * k[1, j] + 2.0 * k[2, j] + k[3, j])
-    finish_step(out[: size - WORKS], command, numbers)
+    finish_step(out[:n], command, numbers)
 
 
 @allocating

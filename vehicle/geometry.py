@@ -39,10 +39,6 @@ class Hull(Section):
     nose_exponent: float = parameter("fullness of the nose, n", "1", above=0.0)
     tail_angle: float = parameter("half angle of the tail's end, theta", "rad", low=0.0, high=1.5)
 
-    def slices(self, count: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the centroids from the hull centre [m] and half the side areas [m2] of slices, (count,) each."""
-        return _slices(self, count)
-
 
 @dataclass(frozen=True, kw_only=True)
 class TowPoint(Section):
@@ -79,7 +75,7 @@ def hull_radius(hull: Hull, x: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=64)
-def _slices(hull: Hull, count: int) -> tuple[np.ndarray, np.ndarray]:
+def slices(hull: Hull, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the centroids from the hull centre [m] and half the side areas [m2] of slices, (count,) each."""
     step = hull.length / (count * PARTS_OF_A_SLICE)
     x = hull.nose_station - step * (np.arange(count * PARTS_OF_A_SLICE) + 0.5)

@@ -8,12 +8,13 @@ one: its file, a row of LISTS, a field of `Vehicle` and `VehicleNumbers`, its nu
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
 from subzero.errors import short
-from vehicle.box_sections import HullSection, section_problems
 from vehicle.buoyancy_engine import MOST_ENGINES, NO_ENGINE, BuoyancyEngine
 from vehicle.channels import MOST_CHANNELS, Channel, table_of
+from vehicle.cross_flow import HullSection, section_problems
 from vehicle.derivatives import derivatives_of, is_table
 from vehicle.fin_list import MOST_FINS, NO_FIN, Fin
 from vehicle.flow_axes import FlowAxes
@@ -45,14 +46,9 @@ FIXED_COMMANDS = ("propeller", "rudder", "stern_plane", "stern_plane_port", "ste
 """Names that commands of listed actuators cannot have."""
 
 
-def channels_of(vehicle: Vehicle) -> tuple[Channel, ...]:
-    """Return the commands of the listed actuators of a vehicle, in their order."""
-    return tuple(
-        channel
-        for section in LISTS
-        for name, part in getattr(vehicle, section)
-        for channel in part.channels(name)
-    )
+def listed_parts(vehicle: Vehicle) -> list[tuple[Channel, ...]]:
+    """Return the commands of each listed actuator of a vehicle, in their order."""
+    return [part.channels(name) for section in LISTS for name, part in getattr(vehicle, section)]
 
 
 def listed_numbers(vehicle: Vehicle) -> dict[str, Any]:
@@ -78,13 +74,9 @@ def listed_numbers(vehicle: Vehicle) -> dict[str, Any]:
 
 def _first_channels(vehicle: Vehicle) -> dict[str, int]:
     """Return the name of each listed actuator → the number of its first channel."""
-    first: dict[str, int] = {}
-    count = 0
-    for section in LISTS:
-        for name, part in getattr(vehicle, section):
-            first[name] = count
-            count += len(part.channels(name))
-    return first
+    names = [name for section in LISTS for name, _ in getattr(vehicle, section)]
+    counts = [len(channels) for channels in listed_parts(vehicle)]
+    return dict(zip(names, accumulate(counts, initial=0), strict=False))
 
 
 def _filled(rows: list[Any], empty: Any, most: int) -> tuple[Any, ...]:

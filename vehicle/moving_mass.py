@@ -187,12 +187,5 @@ def add_moving_masses(
             out[i] -= change[i, j] * rate[j]
 
 
-NO_MASS = MovingMass(
-    mass=1.0,
-    **dict.fromkeys(
-        ("x", "y", "z", "travel_aft", "travel_forward", "turn_limit", "lag", "lost_command"), 0.0
-    ),
-    slide_rate=1.0,
-    turn_rate=1.0,
-).numbers(0, 0.0)
+NO_MASS = MovingMass(**dict.fromkeys(MovingMass.__dataclass_fields__, 1.0)).numbers(0, 0.0)
 """Fills the compiled list behind the last mass."""

@@ -12,10 +12,10 @@ import dataclasses
 import math
 from collections.abc import Mapping
 from contextlib import suppress
-from difflib import get_close_matches
 from numbers import Real
 from typing import Any
 
+from subzero import errors
 from subzero.errors import UserError, real, short
 
 
@@ -115,8 +115,6 @@ def is_plainly_right(value: object, field: dataclasses.Field[Any]) -> bool:
 def check_value(key: str, value: object, field: dataclasses.Field[Any]) -> Problem | None:
     """Return the problem with one value, or None."""
     low, high, strict = (field.metadata[name] for name in ("low", "high", "strict"))
-    if type(value) is float and low < value < high:
-        return None
     if isinstance(value, float) and value == math.inf and field.metadata["unlimited"]:
         return None
     number = real(value)
@@ -133,7 +131,7 @@ def check_value(key: str, value: object, field: dataclasses.Field[Any]) -> Probl
 
 def nearest(name: object, valid: list[str]) -> str:
     """Suggest the nearest valid name, or list them all."""
-    close = get_close_matches(name, valid, n=1, cutoff=0.5) if isinstance(name, str) else []
+    close = errors.nearest(name, valid) if isinstance(name, str) else []
     return f"did you mean '{close[0]}'" if close else "one of " + ", ".join(valid)
 
 

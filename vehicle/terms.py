@@ -20,12 +20,10 @@ import numpy as np
 
 from subzero.jit import inlined, scratch
 from vehicle.added_mass import munk_correction
-from vehicle.axial_drag import axial_drag
 from vehicle.body_lift import body_lift
-from vehicle.box_sections import add_section_drag
 from vehicle.buoyancy_engine import add_engines
-from vehicle.cross_flow import cross_flow_drag
-from vehicle.damping import linear_damping, quadratic_damping
+from vehicle.cross_flow import add_section_drag, cross_flow_drag
+from vehicle.damping import axial_drag, linear_damping, quadratic_damping
 from vehicle.derivatives import add_damping
 from vehicle.fin_list import MOST_FINS, add_fins, listed_angles
 from vehicle.fins import rudder, stern_plane

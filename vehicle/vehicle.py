@@ -7,10 +7,10 @@ A `Vehicle` is frozen and has no defaults: its numbers come from a file (`scenar
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields
 from functools import lru_cache
 from math import isfinite
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 
@@ -18,13 +18,11 @@ from subzero.errors import short
 from subzero.jit import Record
 from vehicle.actuators import Servo, Servos
 from vehicle.added_mass import AddedMass
-from vehicle.axial_drag import AxialDrag
 from vehicle.body_lift import BodyLift
-from vehicle.box_sections import HullSection, strips_of
 from vehicle.buoyancy_engine import BuoyancyEngine, EngineNumbers
 from vehicle.channels import Channel
-from vehicle.cross_flow import CrossFlowDrag
-from vehicle.damping import LinearDamping, QuadraticDamping
+from vehicle.cross_flow import CrossFlowDrag, HullSection, strips_of
+from vehicle.damping import AxialDrag, LinearDamping, QuadraticDamping
 from vehicle.derivatives import NO_DERIVATIVES, Derivatives
 from vehicle.fin_list import Fin, ListedFinNumbers
 from vehicle.fins import FinNumbers, Fins
@@ -37,10 +35,10 @@ from vehicle.lists import (
     HULL_SECTIONS,
     LISTS,
     OPTIONAL,
-    channels_of,
     further_problems,
     list_problems,
     listed_numbers,
+    listed_parts,
     read_optional,
 )
 from vehicle.motor import Battery, Motor, MotorNumbers, motor_numbers
@@ -185,7 +183,7 @@ class Vehicle:
     @property
     def channels(self) -> tuple[Channel, ...]:
         """The commands of its listed actuators, in the order of commands and states behind those of `vehicle.STATE`."""
-        return channels_of(self)
+        return tuple(channel for part in listed_parts(self) for channel in part)
 
     @property
     def state_size(self) -> int:
@@ -216,7 +214,7 @@ class Vehicle:
         if self.products_of_inertia:
             rigid_body = rigid_body + self.products_of_inertia.matrix()
         if self.derivatives:
-            added_mass = added_mass + self.derivatives.added_mass(density, length)
+            added_mass = added_mass + self.derivatives.matrix("added_mass", density, length)
         mass_matrix = rigid_body + added_mass
         rows = self.derivatives.with_dimensions(density, length)
         return VehicleNumbers(
@@ -241,8 +239,8 @@ class Vehicle:
             ),
             motor=motor_numbers(self.motor, self.battery),
             tabled=bool(self.derivatives),
-            linear_table=self.derivatives.linear(density, length),
-            quadratic_table=self.derivatives.quadratic(density, length),
+            linear_table=self.derivatives.matrix("linear", density, length),
+            quadratic_table=self.derivatives.matrix("quadratic", density, length),
             products=product_table_of(rows, self.derivatives.named),
             product_count=count_of(rows),
             race=self.race.numbers() if self.race else NO_RACE,
@@ -292,26 +290,9 @@ def _parts(numbers: VehicleNumbers) -> list[Any]:
     ]
 
 
+_KINDS = get_type_hints(Vehicle)
 SECTIONS: dict[str, type] = {
-    "water": Water,
-    "hull": Hull,
-    "rigid_body": RigidBody,
-    "buoyancy": Buoyancy,
-    "added_mass": AddedMass,
-    "axial_drag": AxialDrag,
-    "body_lift": BodyLift,
-    "cross_flow_drag": CrossFlowDrag,
-    "linear_damping": LinearDamping,
-    "quadratic_damping": QuadraticDamping,
-    "propeller": Propeller,
-    "motor": Motor,
-    "battery": Battery,
-    "rudder": Fins,
-    "stern_planes": Fins,
-    "rudder_servo": Servo,
-    "stern_plane_port_servo": Servo,
-    "stern_plane_starboard_servo": Servo,
-    "tow_point": TowPoint,
+    each.name: _KINDS[each.name] for each in fields(Vehicle) if each.default is MISSING
 }
 """Every section of a vehicle and the dataclass that reads it."""
 
@@ -367,7 +348,7 @@ def inconsistencies(
 ) -> list[Problem]:
     """Return the inconsistencies between numbers that are valid by themselves."""
     problems = []
-    tabled = derivatives.added_mass(density, hull.length) if derivatives else np.zeros((6, 6))
+    tabled = derivatives.matrix("added_mass", density, hull.length) if derivatives else np.zeros((6, 6))
     if derivatives and np.linalg.eigvalsh(added_mass.matrix() + tabled)[0] < -1e-9:
         why = "the added mass would give negative kinetic energy"
         allowed = "a matrix without negative eigenvalues"

@@ -35,7 +35,7 @@ from scenarios.parameters import with_vehicle
 from subzero import autopilot
 from subzero.external_force import MissingForce, Term
 from vehicle import Vehicle, from_mapping
-from vehicle.box_sections import HullSection
+from vehicle.cross_flow import HullSection
 from vehicle.rigid_body import ProductsOfInertia
 
 ROWS = 5
