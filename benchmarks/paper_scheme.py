@@ -15,25 +15,22 @@ from pathlib import Path
 import numpy as np
 
 import cable
-from cable.feng_allen import run as feng_allen
-from cable.feng_allen.run import BoxHistory
+from cable.feng_allen.run import run_paper
 from cable.task import PullOut
 
 DRAG = cable.CableProperties().tangential_drag
 FIGURE = Path(__file__).parent.parent / "docs" / "figures" / "paper_scheme.png"
 
 
-def pull_out_paper(tow_velocity, duration, step, *, reading="tangent", implicit=False) -> BoxHistory:
-    """Run the paper's scheme; with the states of its nodes, which `cable.pull_out` does not show."""
+def pull_out_paper(tow_velocity, duration, step, *, reading="tangent", implicit=False) -> cable.History:
+    """Run the paper's scheme."""
     scheme = cable.Paper(time_step=step, reading=reading, implicit=implicit)
-    return feng_allen.pull_out_paper(PullOut(tow_velocity=tow_velocity, duration=duration), scheme)
+    return cable.pull_out(tow_velocity, duration, scheme=scheme)
 
 
-def pull_out_boxes(tow_velocity, duration, step) -> BoxHistory:
+def pull_out_boxes(tow_velocity, duration, step) -> cable.History:
     """Run equation (7) in boxes."""
-    return feng_allen.pull_out_boxes(
-        PullOut(tow_velocity=tow_velocity, duration=duration), cable.Equation7(time_step=step)
-    )
+    return cable.pull_out(tow_velocity, duration, scheme=cable.Equation7(time_step=step))
 
 
 def ahead(_time):
@@ -95,7 +92,7 @@ def dive_table() -> str:
     return table(head, rows)
 
 
-def jitter(run: BoxHistory) -> float:
+def jitter(run: cable.History) -> float:
     """Return the largest kink of the tow tension, T(t − Δt) − 2 T(t) + T(t + Δt), from 22 s on. [N]."""
     return float(np.abs(np.diff(run.tow_tension, 2))[run.time[1:-1] >= 22.0].max())
 
@@ -104,10 +101,12 @@ def drum_table() -> str:
     """How the printed state of the new node fares on a straight line, where nothing may bend."""
     rows = []
     for step in (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.005):
-        run = pull_out_paper(ahead, 30.0 if step >= 0.02 else 5.0, step, reading="drum")
-        bend = max(float(np.abs(y[:, 5] - np.pi).max()) for y in run.states)
+        duration, scheme = 30.0 if step >= 0.02 else 5.0, cable.Paper(time_step=step, reading="drum")
+        run = cable.pull_out(ahead, duration, scheme=scheme)
+        record, _ = run_paper(PullOut(tow_velocity=ahead, duration=duration), scheme)
+        bend = max(float(np.abs(y[:, 5] - np.pi).max()) for y in record.states)
         side = float(np.abs(run.tow_force[:, 2]).max())
-        end = "runs to 30 s" if run.converged else f"Newton fails at {run.time[-1] + step:.3g} s"
+        end = "runs to 30 s" if run.outcome.completed else f"Newton fails at {run.time[-1] + step:.3g} s"
         error = float(np.abs(run.tow_tension - DRAG * run.length).max())
         rows.append([f"{step:g}", f"{step / 0.1:g}", f"{bend:.1f}", f"{error:.3f}", f"{side:.3f}", end])
     head = [
@@ -185,7 +184,7 @@ def draw() -> None:
     )
     rest.plot(ours.time, ours.tow_tension, color=BLUE, linewidth=1.2, label="moving end, 1 s")
     for step, colour in ((1.0, ORANGE), (0.2, GREEN)):
-        place = pull_out_paper(ahead, 30.0, step, reading="drum").positions[-1]
+        place = pull_out_paper(ahead, 30.0, step, reading="drum").shapes[-1]
         bend.plot(
             place[:, 0],
             place[:, 2],

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from subzero.arguments import checked_arguments
+from subzero.arguments import checked_arguments, numbers_in
 from subzero.errors import BadValueError, short
 from subzero.jit import allocating, inlined, inner
 
@@ -140,13 +140,10 @@ class Current:
 
 def _numbers(name: str, values: Any) -> np.ndarray:
     """Return finite numbers as an array, or refuse them."""
-    try:
-        array = np.array(values)
-        if array.dtype.kind in "iuf" and np.isfinite(array).all():
-            return array.astype(float)
-    except (ValueError, TypeError, OverflowError):
-        pass
-    raise BadValueError(f"Current: {name} must be finite numbers; got {short(values)}.")
+    array = numbers_in(values)
+    if array is None or not np.isfinite(array).all():
+        raise BadValueError(f"Current: {name} must be finite numbers; got {short(values)}.")
+    return array
 
 
 def _three(name: str, values: Any) -> np.ndarray:

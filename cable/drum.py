@@ -59,17 +59,12 @@ class DrumNumbers(Record):
         place, velocity: of the drum at the new time, relative to its place at the start (3,). [m], [m/s]
     """
 
-    inertia: float
-    friction: float
-    control: int
-    setpoint: float
-    place: np.ndarray
-    velocity: np.ndarray
-
-    @classmethod
-    def at_rest(cls, *, inertia: float = 0.0, friction: float = 0.0, control: int = FREE) -> DrumNumbers:
-        """Return the numbers of a drum that remains where it was at the start."""
-        return cls(inertia, friction, control, 0.0, np.zeros(3), np.zeros(3))
+    inertia: float = 0.0
+    friction: float = 0.0
+    control: int = FREE
+    setpoint: float = 0.0
+    place: np.ndarray = np.zeros(3)
+    velocity: np.ndarray = np.zeros(3)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,7 +99,7 @@ class DrumProperties:
             raise BadValueError(
                 f"DrumProperties: radius is {self.radius:g}; so small that inertia and friction are not finite."
             )
-        return DrumNumbers.at_rest(inertia=inertia, friction=friction)
+        return DrumNumbers(inertia=inertia, friction=friction)
 
 
 @inner

@@ -311,19 +311,17 @@ class Equilibrium:
     def _overview(self) -> Overview:
         """Return its length, its span, and how it pulls at both ends."""
         span = float(np.linalg.norm(self.shape[-1] - self.shape[0]))
-        ends = {"first end": self.tow_force, "second end": self.drum_force}
         rows = [
             ("length", f"{self.length:.4g} m between ends {span:.4g} m apart"),
-            *(
-                (
-                    name,
-                    f"{np.linalg.norm(force):.4g} N: "
-                    + ", ".join(f"{part:.4g}" for part in force)
-                    + " N north, east, down",
-                )
-                for name, force in ends.items()
-            ),
+            ("first end", _in_words(self.tow_force)),
+            ("second end", _in_words(self.drum_force)),
             ("tension", f"{self.tensions.min():.4g} to {self.tensions.max():.4g} N"),
             *(("warning", words) for words in self.warnings),
         ]
         return Overview("Cable at rest", rows)
+
+
+def _in_words(force: np.ndarray) -> str:
+    """Return the size of a force (3,) [N], and its components."""
+    parts = ", ".join(f"{part:.4g}" for part in force)
+    return f"{np.linalg.norm(force):.4g} N: {parts} N north, east, down"

@@ -21,7 +21,7 @@ from cable.sea_bed import SeaBed
 from cable.sections import COLUMNS, AnyCable, SectionedCable, check_length
 from cable.task import current_of
 from cable.winch import Brake
-from subzero.arguments import checked_arguments
+from subzero.arguments import checked_arguments, numbers_in
 from subzero.errors import UserError, real, short
 
 Place = Sequence[float] | np.ndarray
@@ -118,7 +118,9 @@ def hold(
         steps, scale = _search(line, nodes, water.numbers(places[1]), cable, bed, clamps, surface)
         if steps > 0:
             found = _found(line, places, length, cable, water, steps, scale)
-            found = found if bed is None else replace(found, bed=bed, bed_friction=_friction(line))
+            if bed is not None:
+                friction = line.friction[NEW, : line.ends.count + 1].copy()
+                found = replace(found, bed=bed, bed_friction=friction)
             found = replace(found, clamps=clamps, surface=surface)
             _check_bends(found)
             return found
@@ -140,7 +142,10 @@ def _search(
     surface: float | None,
 ) -> tuple[int, float]:
     """Bring a line to rest from node positions, or from a catenary; return steps (−1: none) and the unit of force."""
-    c, work, brake = _at_rest_on(bed, cable, clamps, surface), new_load(), Brake().numbers()
+    work, brake = new_load(), Brake().numbers()
+    c: Any = cable.numbers(bed, clamps, surface)
+    if bed is not None:
+        c.is_at_rest = True
     brake.setpoint = line.ends.settled + line.ends.last_length[NOW]
     if surface is not None:
         c.surface_level = -1.0 / WEIGHTLESS  # hang it in water everywhere
@@ -238,20 +243,6 @@ def _come_to_rest(
     return steps, scale
 
 
-def _at_rest_on(bed: SeaBed | None, cable: AnyCable, clamps: Clamps | None, surface: float | None) -> Any:
-    """Return the cable's numbers for a search for rest."""
-    c: Any = cable.numbers(bed, clamps, surface)
-    if bed is not None:
-        c.is_at_rest = True
-    return c
-
-
-def _friction(line: Line) -> np.ndarray:
-    """Return the bed's friction on the nodes, as a share of its pressure (nodes, 3). [-]"""
-    friction: np.ndarray = line.friction[NEW, : line.ends.count + 1].copy()
-    return friction
-
-
 def _in_units_of(scale: float, c: Any) -> Any:
     """Return a cable's numbers for forces in units of `scale` newtons."""
     c = c.copy()
@@ -284,19 +275,10 @@ def _check_bends(found: Equilibrium) -> None:
         raise HoldError(message)
 
 
-def _numbers_of(given: object) -> np.ndarray:
-    """Return given values as an array of numbers, empty for anything else."""
-    try:
-        found = np.array(given)
-    except (TypeError, ValueError, OverflowError):
-        return np.empty(0)
-    return found.astype(float) if found.dtype.kind in "iuf" else np.empty(0)
-
-
 def _checked_ends(ends: Sequence[Place] | np.ndarray) -> np.ndarray:
     """Return the ends as finite numbers (2, 3)."""
-    places = _numbers_of(ends)
-    if places.shape != (2, 3) or not np.isfinite(places).all():
+    places = numbers_in(ends)
+    if places is None or places.shape != (2, 3) or not np.isfinite(places).all():
         message = f"hold: ends must be two places of three finite numbers (north, east, down in m); got {short(ends)}."
         raise HoldError(message)
     return places
@@ -347,10 +329,10 @@ def _segments(length: float, given: float | None) -> int:
 
 def _checked_start(start: Place, places: np.ndarray) -> np.ndarray:
     """Return node positions relative to the second end."""
-    nodes = _numbers_of(start)
-    if nodes.ndim != 2 or nodes.shape[0] < 2 or nodes.shape[1] != 3 or not np.isfinite(nodes).all():
-        message = f"hold: start must be finite node positions (n, 3), two at least; got shape {nodes.shape}."
-        raise HoldError(message)
+    nodes = numbers_in(start)
+    if nodes is None or nodes.shape[1:] != (3,) or len(nodes) < 2 or not np.isfinite(nodes).all():
+        got = "no numbers" if nodes is None else f"shape {nodes.shape}"
+        raise HoldError(f"hold: start must be finite node positions (n, 3), two at least; got {got}.")
     from_second_end: np.ndarray = nodes - places[1]
     return from_second_end
 

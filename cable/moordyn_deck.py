@@ -19,19 +19,12 @@ from cable.sea_bed import SeaBed
 from cable.sections import Body, Section, SectionedCable
 from subzero.errors import BadValueError, short, suggestion
 
-TABLES = {
-    "LINE TYPES": "types",
-    "LINE DICTIONARY": "types",
-    "POINTS": "points",
-    "POINT PROPERTIES": "points",
-    "CONNECTION PROPERTIES": "points",
-    "LINES": "lines",
-    "LINE PROPERTIES": "lines",
-    "OPTIONS": "options",
-    "SOLVER OPTIONS": "options",
-    "OUTPUT": "end",
-    "OUTPUTS": "end",
-}
+TABLES = dict.fromkeys(("LINE TYPES", "LINE DICTIONARY"), "types")
+TABLES |= dict.fromkeys(("POINTS", "POINT PROPERTIES", "CONNECTION PROPERTIES"), "points")
+TABLES |= dict.fromkeys(("LINES", "LINE PROPERTIES"), "lines")
+TABLES |= dict.fromkeys(("OPTIONS", "SOLVER OPTIONS"), "options") | dict.fromkeys(
+    ("OUTPUT", "OUTPUTS"), "end"
+)
 """Heading → what it begins."""
 NOT_HERE = (
     "ROD TYPES",
@@ -47,16 +40,8 @@ NOT_HERE = (
 USED = ("WtrDpth", "WtrDnsty", "rhoW", "rho", "kBot", "cBot", "FrictionCoefficient", "g", "gravity", "depth")
 NUMERICS = (
     *("dtM", "dtIC", "TmaxIC", "CdScaleIC", "threshIC", "tScheme", "writeLog", "dtOut", "writeUnits", "Echo"),
-    *(
-        "ICDfac",
-        "ICthresh",
-        "ICTmax",
-        "StatDynFricScale",
-        "FricDamp",
-        "disableOutput",
-        "disableOutTime",
-        "TMax",
-    ),
+    *("ICDfac", "ICthresh", "ICTmax", "TMax", "StatDynFricScale", "FricDamp"),
+    *("disableOutput", "disableOutTime"),
 )
 PHYSICS = ("WaveKin", "Currents", "WaterKin", "dtWave", "UnifyCurrentGrid", "SeafloorFile", "bathymetry")
 """Options that are used, that concern MoorDyn's solver only, and that are left out."""
@@ -142,7 +127,8 @@ def _tables(text: str) -> tuple[dict[str, list[Row]], list[str]]:
             value, _, rest = line.partition(" ")
             tables[table].append({"value": value, "name": (rest.split() or [""])[0], "line": str(number)})
         elif skipped == 0:
-            columns, skipped = [_column(word) for word in line.split()], 1
+            words = line.upper().split()
+            columns, skipped = [COLUMNS.get(word, word) for word in words], 1
         elif skipped == 1:  # the row of units
             skipped = 2
         else:
@@ -165,28 +151,13 @@ def _table_of(heading: str, number: int, before: str, left_out: list[str]) -> st
     )
 
 
-def _column(word: str) -> str:
-    """Return the one name of a column that decks write in several ways."""
-    word = word.upper()
-    same = {
-        "TYPENAME": "NAME",
-        "MASSDEN": "MASS/M",
-        "MASSDENINAIR": "MASS/M",
-        "MASS/LENGTH": "MASS/M",
-        "CDN": "CD",
-    }
-    same |= {"CAN": "CA", "CDT": "CDAX", "CAT": "CAAX", "BA/-ZETA": "BA", "NODE": "ID", "CONNECTION": "TYPE"}
-    same |= {
-        "LINETYPE": "TYPE",
-        "ATTACHA": "A",
-        "NODEA": "A",
-        "ANCH": "A",
-        "ATTACHB": "B",
-        "NODEB": "B",
-        "FAIR": "B",
-    }
-    same |= {"UNSTRLEN": "LENGTH", "NUMSEGS": "SEGMENTS", "M": "MASS", "V": "VOLUME", "CDA": "DRAG_AREA"}
-    return same.get(word, word)
+SPELLINGS = """
+NAME=TYPENAME MASS/M=MASSDEN MASS/M=MASSDENINAIR MASS/M=MASS/LENGTH CD=CDN CA=CAN CDAX=CDT CAAX=CAT BA=BA/-ZETA
+ID=NODE TYPE=CONNECTION TYPE=LINETYPE A=ATTACHA A=NODEA A=ANCH B=ATTACHB B=NODEB B=FAIR
+LENGTH=UNSTRLEN SEGMENTS=NUMSEGS MASS=M VOLUME=V DRAG_AREA=CDA
+"""
+COLUMNS = {word: name for name, _, word in (pair.partition("=") for pair in SPELLINGS.split())}
+"""Name of a column as some decks write it → its one name here."""
 
 
 def _number(row: Row, name: str, *, default: float | None = None) -> float:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -41,22 +42,12 @@ from subzero.arguments import checked_arguments
 from subzero.errors import BadValueError, short, suggestion
 
 
-def _lumped_pull_out(task: PullOut, scheme: Lumped) -> History:
-    from cable.lumped.history import pull_out  # compiled, and imported, only when it is asked for
-
-    return pull_out(task, scheme)
-
-
-def _lumped_tow(task: Tow, scheme: Lumped) -> History:
-    from cable.lumped.history import tow
-
-    return tow(task, scheme)
+def _fetched(module: str, name: str) -> Callable[[Any, Any], History]:
+    """Return a function of a module that is imported, and compiled, only when it is called."""
+    return lambda task, scheme: getattr(import_module(module), name)(task, scheme)
 
 
-def _in_angles(task: PullOut, scheme: Equation7 | Paper) -> History:
-    from cable.feng_allen.run import pull_out
-
-    return pull_out(task, scheme)
+_in_angles = _fetched("cable.feng_allen.run", "pull_out")
 
 
 @dataclass(frozen=True)
@@ -85,8 +76,8 @@ SCHEMES: Mapping[str, Scheme] = {
     "equation7": Scheme(Equation7(), _in_angles, None, PLAIN),
     "lumped": Scheme(
         Lumped(),
-        _lumped_pull_out,
-        _lumped_tow,
+        _fetched("cable.lumped.history", "pull_out"),
+        _fetched("cable.lumped.history", "tow"),
         EVERYTHING - {EQUILIBRIUM, INTERNAL_DAMPING, SEA_BED, SECTIONS, MASS_ALONG, CLAMPS, SURFACE},
     ),
 }

@@ -31,7 +31,20 @@ READINGS = ("tangent", "drum")
 
 
 @dataclass(frozen=True, kw_only=True)
-class MovingEnd:
+class _Steps:
+    """A scheme whose time step and segment length are independent of one another."""
+
+    time_step: float = 0.1
+    segment_length: float = 0.5
+
+    def __post_init__(self) -> None:
+        """Raise an error if a step or a segment length is not valid."""
+        _keep(self, "time_step", least=SHORTEST_S, unit="s")
+        _keep(self, "segment_length", above=0.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class MovingEnd(_Steps):
     """The default: Cartesian balances, a last segment that grows at the drum, backward differences in time.
 
     Of second order in time and space; segment length and step are independent of one another.
@@ -55,8 +68,6 @@ class MovingEnd:
     """
 
     name: ClassVar[str] = "moving_end"
-    time_step: float = 0.1
-    segment_length: float = 0.5
     rtol: float = 0.0
     grading: float = 0.0
     run_in: float = 0.0
@@ -64,7 +75,7 @@ class MovingEnd:
 
     def __post_init__(self) -> None:
         """Raise an error if a step, a segment length or a tolerance is not valid."""
-        _check_steps(self)
+        super().__post_init__()
         _keep(self, "rtol", least=0.0, most=0.5)
         _keep(self, "grading", least=0.0, most=0.5)
         _keep(self, "run_in", least=0.0, most=LONGEST_RUN_IN_M, unit="m")
@@ -72,7 +83,7 @@ class MovingEnd:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Lumped:
+class Lumped(_Steps):
     """Masses at nodes and stiff springs between them, another scheme in time: the other code to compare with.
 
     An inextensible cable stretches by 1e-6 of its length at one newton (`lumped.springs.LEAST_COMPLIANCE`).
@@ -83,16 +94,10 @@ class Lumped:
     """
 
     name: ClassVar[str] = "lumped"
-    time_step: float = 0.1
-    segment_length: float = 0.5
-
-    def __post_init__(self) -> None:
-        """Raise an error if a step or a segment length is not valid."""
-        _check_steps(self)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Equation7:
+class Equation7(_Steps):
     """The six unknowns of the paper's equation (7) in a scheme of second order with a moving end; it knows no slack.
 
     Attributes:
@@ -101,12 +106,6 @@ class Equation7:
     """
 
     name: ClassVar[str] = "equation7"
-    time_step: float = 0.1
-    segment_length: float = 0.5
-
-    def __post_init__(self) -> None:
-        """Raise an error if a step or a segment length is not valid."""
-        _check_steps(self)
 
 
 @checked_arguments
@@ -145,13 +144,7 @@ Options = MovingEnd | Lumped | Equation7 | Paper
 """A scheme with its options."""
 
 
-def _check_steps(scheme: MovingEnd | Lumped | Equation7) -> None:
-    """Keep time step and segment length as floats, or refuse them."""
-    _keep(scheme, "time_step", least=SHORTEST_S, unit="s")
-    _keep(scheme, "segment_length", above=0.0)
-
-
-def _keep(scheme: Options, name: str, **limits: float | str) -> None:
+def _keep(scheme: _Steps | Paper, name: str, **limits: float | str) -> None:
     """Keep an option as a float, or refuse it."""
     value = checked(type(scheme).__name__, name, getattr(scheme, name), **limits)  # type: ignore[arg-type]
     object.__setattr__(scheme, name, value)

@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import KW_ONLY, dataclass, fields, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -113,19 +113,8 @@ class Section:
         object.__setattr__(self, "cable", replace(self.cable, normal_drag_coefficient=drag))
 
 
-@dataclass(frozen=True, kw_only=True)
-class _BodyNumbers:
-    """The numbers of a body."""
-
-    mass: float = 0.0
-    volume: float = 0.0
-    drag_area: float = 0.0
-    lift_area: float = 0.0
-    added_mass_coefficient: float = 0.5
-
-
 @dataclass(frozen=True)
-class Body(_BodyNumbers):
+class Body:
     """A point mass, float, clump, drogue or towed body on a line.
 
     Attributes:
@@ -138,6 +127,12 @@ class Body(_BodyNumbers):
     """
 
     place: float
+    _: KW_ONLY
+    mass: float = 0.0
+    volume: float = 0.0
+    drag_area: float = 0.0
+    lift_area: float = 0.0
+    added_mass_coefficient: float = 0.5
 
     def __post_init__(self) -> None:
         """Raise an error if the fields do not describe a body."""

@@ -58,44 +58,72 @@ class MovingDrum:
 
 
 @dataclass(frozen=True, kw_only=True)
-class PullOut:
-    """A cable that is pulled off a drum by a tow point whose motion is prescribed.
+class _Task:
+    """What both kinds of tasks are made of.
 
     Attributes:
         tow_velocity: function of time [s] that gives the tow point's velocity north, east, down (3,). [m/s]
         duration: how long. [s]
         cable: the cable.
-        drum: a free drum, or a winch.
-        drum_velocity: the same of the drum; None for one on the shore.
-        current: how the water moves.
-        start: length of cable in the water at the start, laid straight behind the tow point [m]; or how it hangs.
-        origin: place of the drum at the start, in the axes of the current (3,). [m]
+        current: how the water moves, at places relative to `PullOut.origin`, or to the tow point at the start.
         bed: the sea bed, in the axes of the current; None without.
         clamps: directions in which it leaves its ends; None for hinges.
         surface: depth of the free surface, in the axes of the current; None for water everywhere. [m]
 
     Raises:
-        subzero.UserError: a start or a duration that makes no sense.
+        subzero.UserError: a duration that is too short to be halved.
     """
 
     tow_velocity: Velocity
     duration: float
     cable: AnyCable = field(default_factory=CableProperties)
-    drum: Drum = field(default_factory=DrumProperties)
-    drum_velocity: Velocity | None = None
     current: Current = field(default_factory=lambda: Current.uniform(np.zeros(3)))
-    start: float | Equilibrium = 0.0
-    origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
     bed: SeaBed | None = None
     clamps: Clamps | None = None
     surface: float | None = None
+
+    def __post_init__(self) -> None:
+        """Raise an error if the duration is not valid."""
+        duration = checked("", "duration", self.duration, least=SHORTEST_S, unit="s")
+        object.__setattr__(self, "duration", duration)
+
+    def asks_for(self) -> list[str]:
+        """Return the features of `EVERYTHING` that it asks for."""
+        asked = {
+            SEA_BED: self.bed is not None,
+            CLAMPS: self.clamps is not None,
+            SURFACE: self.surface is not None,
+            SECTIONS: isinstance(self.cable, SectionedCable),
+            MASS_ALONG: getattr(self.cable, "tangential_added_mass_coefficient", 0.0) > 0.0,
+        }
+        return [what for what, is_asked in asked.items() if is_asked]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PullOut(_Task):
+    """A cable that is pulled off a drum by a tow point whose motion is prescribed.
+
+    Attributes:
+        drum: a free drum, or a winch.
+        drum_velocity: the same as of the tow point; None for a drum on the shore.
+        start: length of cable in the water at the start, laid straight behind the tow point [m]; or how it hangs.
+        origin: place of the drum at the start, in the axes of the current (3,). [m]
+
+    Raises:
+        subzero.UserError: a start or a duration that makes no sense.
+    """
+
+    drum: Drum = field(default_factory=DrumProperties)
+    drum_velocity: Velocity | None = None
+    start: float | Equilibrium = 0.0
+    origin: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     def __post_init__(self) -> None:
         """Raise an error if the start or the duration is not valid."""
         if not isinstance(self.start, Equilibrium):
             start = checked("", "start", self.start, least=0.0, unit="m, or what cable.hold gives")
             object.__setattr__(self, "start", start)
-        _keep_duration(self)
+        super().__post_init__()
 
     @property
     def wet_length(self) -> float:
@@ -112,71 +140,35 @@ class PullOut:
             EQUILIBRIUM: isinstance(self.start, Equilibrium),
             INTERNAL_DAMPING: self.cable.internal_damping > 0.0,
         }
-        return [what for what, is_asked in asked.items() if is_asked] + _asked_of(self)
+        return [what for what, is_asked in asked.items() if is_asked] + super().asks_for()
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tow:
+class Tow(_Task):
     """A cable of a fixed length with a free tail, towed by a point whose motion is prescribed.
 
     Attributes:
-        tow_velocity: function of time [s] that gives the tow point's velocity north, east, down (3,). [m/s]
         length: L. [m]
-        duration: how long. [s]
-        cable: the cable.
-        current: how the water moves, at places relative to the tow point at the start.
         drogue_drag_area: C_d A of a drogue at the free end; 0 is a free tail. [m²]
-        bed: the sea bed, at places relative to the tow point at the start; None without.
-        clamps: direction in which it leaves the tow point; None for a hinge.
-        surface: depth of the free surface, relative to the tow point at the start; None for water everywhere. [m]
 
     Raises:
         subzero.UserError: a length, a duration or a drogue that makes no sense.
     """
 
-    tow_velocity: Velocity
     length: float
-    duration: float
-    cable: AnyCable
-    current: Current
-    drogue_drag_area: float
-    bed: SeaBed | None
-    clamps: Clamps | None
-    surface: float | None
+    drogue_drag_area: float = 0.0
 
     def __post_init__(self) -> None:
         """Raise an error if the length, the duration or the drogue is not valid."""
         object.__setattr__(self, "length", checked("", "length", self.length, above=0.0))
-        _keep_duration(self)
+        super().__post_init__()
         area = checked("", "drogue_drag_area", self.drogue_drag_area, least=0.0)
         object.__setattr__(self, "drogue_drag_area", area)
-
-    def asks_for(self) -> list[str]:
-        """Return the features of `EVERYTHING` that it asks for."""
-        return _asked_of(self)
 
     @property
     def tail_drag(self) -> float:
         """½ρC_dA of the drogue. [kg/m]."""
         return 0.5 * self.cable.water_density * self.drogue_drag_area
-
-
-def _asked_of(task: PullOut | Tow) -> list[str]:
-    """Return the features that both kinds of tasks can ask for."""
-    asked = {
-        SEA_BED: task.bed is not None,
-        CLAMPS: task.clamps is not None,
-        SURFACE: task.surface is not None,
-        SECTIONS: isinstance(task.cable, SectionedCable),
-        MASS_ALONG: getattr(task.cable, "tangential_added_mass_coefficient", 0.0) > 0.0,
-    }
-    return [what for what, is_asked in asked.items() if is_asked]
-
-
-def _keep_duration(task: PullOut | Tow) -> None:
-    """Keep the duration of a task as a float; refuse one that is too short to be halved."""
-    duration = checked("", "duration", task.duration, least=SHORTEST_S, unit="s")
-    object.__setattr__(task, "duration", duration)
 
 
 def current_of(current: Sequence[float] | np.ndarray | Current | None) -> Current:

@@ -55,9 +55,8 @@ from cable.moving_end.host_step import (
 from cable.moving_end.initial_shape import (
     lay_held,
     straight_between,
-    towed_from,
-    trail_on_bed,
-    trail_on_surface,
+    towed,
+    trail,
 )
 from cable.moving_end.state import NOW, Line, enlarged, new_line
 from cable.moving_end.stops import Names, describe_bad_number, describe_jump, describe_reach, describe_stop
@@ -68,7 +67,7 @@ from cable.sections import AnyCable
 from cable.task import START_LENGTH, Drum, current_of
 from cable.tow_path import segments_needed
 from cable.winch import SHORTEST, Brake, ConstantTension, PayOutRate
-from subzero.arguments import checked_arguments
+from subzero.arguments import checked_arguments, numbers_in
 from subzero.errors import BadValueError, UserError, checked, short, whole
 
 Ends = Sequence[Any] | np.ndarray
@@ -199,10 +198,9 @@ class Tether:
                 0.5 * self.cable.water_density * checked("", "drogue_drag_area", drogue_drag_area, least=0.0)
             )
             J = self.current.at(states[0, 0])
-            line, origin = towed_from(self.cable, states[0], start, each, J, tail_drag)
-            line.ends.origin[:] = origin
-            trail_on_bed(line, bed)
-            trail_on_surface(line, surface)
+            line = towed(self.cable, states[0, 1:], start, each, J, tail_drag)
+            origin = line.ends.origin[:] = states[0, 0] - line.position[NOW, 0]
+            trail(line, bed, surface)
         elif abs(start - way) <= STRAIGHT * start or way <= START_LENGTH >= start:
             line, origin = straight_between(states, start, each, drum, c), states[1, 0]
         else:
@@ -562,15 +560,8 @@ def _weight(step: float, before: float) -> float:
 
 def _checked_ends(owner: str, ends: Ends, count: int | None) -> np.ndarray:
     """Return places and velocities (ends, 2, 3); places alone are at rest."""
-    try:
-        given = np.array(ends)
-    except (TypeError, ValueError, OverflowError):
-        given = np.empty(0)
-    if (
-        given.dtype.kind in "iuf"
-        and given.shape[1:] in ((3,), (2, 3))
-        and len(given) in ((1, 2) if count is None else (count,))
-    ):
+    given, counts = numbers_in(ends), (1, 2) if count is None else (count,)
+    if given is not None and given.shape[1:] in ((3,), (2, 3)) and len(given) in counts:
         states = np.zeros((len(given), 2, 3))
         states[:, 0], states[:, 1] = (given, 0.0) if given.ndim == 2 else (given[:, 0], given[:, 1])
         if count is not None or np.isfinite(states).all():

@@ -11,6 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cable.memory import refuse_unless_it_fits
+from cable.sections import AnyCable, SectionedCable
+from subzero.arguments import numbers_in
 from subzero.errors import BadValueError, real, short
 
 Velocity = Callable[[float], Sequence[float] | np.ndarray]
@@ -49,7 +51,7 @@ def sample_path(velocity: Velocity, duration: float, step: float, name: str = "t
     times, h = np.linspace(0.0, duration, steps + 1), duration / steps
 
     def at(moments: np.ndarray) -> np.ndarray:
-        return _three_numbers([velocity(t) for t in moments.tolist()], name, moments)
+        return three_numbers([velocity(t) for t in moments.tolist()], name, moments)
 
     place = np.zeros((steps + 1, 3))
     for offset, weight in GAUSS:
@@ -66,6 +68,26 @@ def first_direction(velocity: np.ndarray) -> np.ndarray:
     if moving.size == 0:
         return np.array([1.0, 0.0, 0.0])
     direction: np.ndarray = velocity[moving[0]] / speeds[moving[0]]
+    return direction
+
+
+def steady_direction(U: np.ndarray, cable: AnyCable, tail_drag: float) -> np.ndarray:
+    """Return the direction from the tail to the tow point in a steady tow, a unit vector (3,).
+
+    Args:
+        U: velocity of the tow point through the water, from the start on (n, 3). [m/s]
+        cable: the cable.
+        tail_drag: ½ρC_dA of a drogue. [kg/m]
+    """
+    speed, weight, ahead = float(np.linalg.norm(U[0])), cable.weight_in_water, first_direction(U)
+    # A cable at rest in the water hangs straight down, or up if it is buoyant.
+    if speed == 0.0 and weight != 0.0:
+        return np.array([0.0, 0.0, -np.sign(weight)])
+    trails = weight == 0.0 or tail_drag > 0.0 or speed == 0.0 or abs(ahead[2]) > 1e-9
+    if trails or isinstance(cable, SectionedCable):
+        return ahead
+    phi = cable.critical_angle(speed)
+    direction: np.ndarray = np.cos(phi) * ahead + np.array([0.0, 0.0, -np.sign(weight) * np.sin(phi)])
     return direction
 
 
@@ -109,16 +131,13 @@ def check_memory(rows: int, segments: int) -> None:
     refuse_unless_it_fits(size, what, SHORTEN)
 
 
-def _three_numbers(
+def three_numbers(
     values: Sequence[Sequence[float] | np.ndarray], name: str, moments: np.ndarray
 ) -> np.ndarray:
     """Return velocities as an array (times, 3); report the first that is not three finite numbers in an error."""
-    try:
-        array = np.array(values)
-        if array.shape == (moments.size, 3) and array.dtype.kind in "iuf" and np.isfinite(array).all():
-            return array.astype(float)
-    except (ValueError, TypeError, OverflowError):
-        pass
+    array = numbers_in(values)
+    if array is not None and array.shape == (moments.size, 3) and np.isfinite(array).all():
+        return array
     for t, value in zip(moments.tolist(), values, strict=True):
         if np.shape(value) != (3,) or any(real(x) is None for x in value):
             raise BadValueError(

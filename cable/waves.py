@@ -29,6 +29,7 @@ from typing import Any
 import numpy as np
 
 from cable.properties import GRAVITY
+from subzero.arguments import numbers_in
 from subzero.errors import BadValueError, checked, short, whole
 
 Numbers = Sequence[Any] | np.ndarray
@@ -342,12 +343,9 @@ def _turned(vector: np.ndarray, heading: float) -> np.ndarray:
 
 def _array(owner: str, name: str, values: object, dimensions: int) -> np.ndarray:
     """Return finite numbers as an array of so many dimensions; raise an error for anything else."""
-    try:
-        array = np.array(values)
-    except (TypeError, ValueError, OverflowError):
-        array = np.empty(0, dtype=object)
-    if array.dtype.kind not in "iuf" or array.ndim != dimensions or not np.isfinite(array).all():
+    array = numbers_in(values)
+    if array is None or array.ndim != dimensions or not np.isfinite(array).all():
         raise BadValueError(
             f"{owner}: {name} is {short(values)}; it must be finite numbers, {dimensions}-dimensional."
         )
-    return array.astype(float)
+    return array

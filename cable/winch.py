@@ -42,7 +42,7 @@ class PayOutRate:
 
     def numbers(self) -> DrumNumbers:
         """Return the plain numbers that compiled code takes."""
-        return DrumNumbers.at_rest(control=LENGTH)
+        return DrumNumbers(control=LENGTH)
 
     def setpoints(self, times: np.ndarray, start: float) -> np.ndarray:
         """Return the length asked for at `times` (n,), from `start` on; Simpson's rule within a step. [m]."""
@@ -61,7 +61,7 @@ class Brake:
 
     def numbers(self) -> DrumNumbers:
         """Return the plain numbers that compiled code takes."""
-        return DrumNumbers.at_rest(control=LENGTH)
+        return DrumNumbers(control=LENGTH)
 
     def setpoints(self, times: np.ndarray, start: float) -> np.ndarray:
         """Return the length at `times` (n,): always `start`. [m]."""
@@ -84,7 +84,7 @@ class ConstantTension:
 
     def numbers(self) -> DrumNumbers:
         """Return the plain numbers that compiled code takes."""
-        return DrumNumbers.at_rest(control=TENSION)
+        return DrumNumbers(control=TENSION)
 
     def setpoints(self, times: np.ndarray, start: float) -> np.ndarray:
         """Return the tension asked for at `times` (n,). [N].

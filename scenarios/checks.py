@@ -16,6 +16,7 @@ import numpy as np
 
 from scenarios.errors import Problem, ScenarioError
 from scenarios.quantities import Quantity
+from subzero.arguments import numbers_in
 from subzero.errors import real
 from subzero.errors import short as shown
 
@@ -148,15 +149,10 @@ class Checks:
         """
         given = getattr(self._value, name)
         words = " × ".join("samples" if n is None else str(n) for n in shape)
-        try:
-            array = np.array(given)
-            good = array.dtype.kind in "iuf"
-        except (ValueError, TypeError, OverflowError):
-            good = False
-        if not good:
+        array = numbers_in(given)
+        if array is None:
             self.say(name, "these are not numbers", f"Allowed: finite numbers, {words}.", given)
             return None
-        array = array.astype(float)
         fits = len(array.shape) == len(shape) and all(
             n == size if n is not None else size > 0 for n, size in zip(shape, array.shape, strict=True)
         )

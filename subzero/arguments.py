@@ -70,6 +70,15 @@ def checked_arguments(made: Made) -> Made:
     return typing.cast(Made, checking)
 
 
+def numbers_in(values: object) -> np.ndarray | None:
+    """Return values as an array of floats, finite or not; None unless they are numbers that form an array."""
+    try:
+        found = np.array(values)
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return found.astype(float) if found.dtype.kind in "iuf" else None
+
+
 def check_is_run(owner: str, run: Any) -> None:
     """Raise an error if a dataset is not a run.
 

@@ -10,7 +10,7 @@ At t_k the cable has nodes 0 … k. A step
 Segment length and time step are one thing here, and the cost of a run grows with the square of its length.
 When the drum stands or is overrun (ΔS ≤ 0) the same nodes take the step and no node is added. While there is
 no cable in the water at all, the single node follows the tow point, (8)-(11). Nothing in the printed scheme
-keeps T ≥ 0: after a stop the trapezoidal rule rings about zero for ever (`run.BoxHistory.smallest_tension`).
+keeps T ≥ 0: after a stop the trapezoidal rule rings about zero for ever (the smallest tension of its diagnostics).
 
 ``implicit=True`` takes the same boxes fully implicit in time, which removes the staircase in the tension that
 the trapezoidal rule of (22) leaves; that is our comparison, not the paper's. What the scheme does, with

@@ -38,46 +38,21 @@ from cable.feng_allen.printed_scheme import paper_step
 from cable.history import History, Outcome
 from cable.schemes import Equation7, Paper
 from cable.task import PullOut, uniform
-from cable.tow_path import Velocity, sample_path
-from subzero.errors import BadValueError, real, short
+from cable.tow_path import Velocity, sample_path, three_numbers
 
 
 def pull_out(task: PullOut, scheme: Equation7 | Paper) -> History:
-    """Pull cable off a free drum on the shore in uniform water, as `cable.pull_out` does."""
-    run = pull_out_paper(task, scheme) if isinstance(scheme, Paper) else pull_out_boxes(task, scheme)
-    return _as_history(
-        run, sample_path(task.tow_velocity, task.duration, scheme.time_step).place, scheme.name
-    )
+    """Pull cable off a free drum on the shore in uniform water, as `cable.pull_out` does.
 
-
-def _as_history(run: BoxHistory, tow: np.ndarray, scheme: str) -> History:
-    """Return a run of the angle formulation as the default scheme's history."""
-    outcome = Outcome(
-        completed=run.converged,
-        message="The run reached its end." if run.converged else run.message,
-        iterations=int(run.iterations.sum()),
-        worst_residual=run.residual,
-    )
-    return History(
-        time=run.time,
-        tow_force=run.tow_force,
-        tow_tension=run.tow_tension,
-        drum_tension=run.drum_tension,
-        length=run.length,
-        tow_point=tow[: len(run.time)],
-        shapes=tuple(run.positions),
-        tensions=tuple(state[:, 0] for state in run.states),
-        outcome=outcome,
-        scheme=scheme,
-    )
-
-
-def pull_out_paper(task: PullOut, scheme: Paper) -> BoxHistory:
-    """Pull cable off the drum with the paper's scheme (14)-(26).
-
-    Returns:
-        the history; a run that cannot go on is cut short and says so in `message`.
+    A run that cannot go on is cut short and says so in its outcome.
     """
+    record, trouble = run_paper(task, scheme) if isinstance(scheme, Paper) else run_boxes(task, scheme)
+    way = sample_path(task.tow_velocity, task.duration, scheme.time_step).place
+    return record.history(way, scheme.name, trouble)
+
+
+def run_paper(task: PullOut, scheme: Paper) -> tuple[BoxRecord, str]:
+    """Pull cable off the drum with the paper's scheme (14)-(26); return the run, and why it was stopped if it was."""
     assert isinstance(task.drum, DrumProperties), "the table of schemes lets no winch through"
     c, drum = equation7_numbers(uniform(task.cable), _uniform(task)), task.drum.numbers()
     wound = 1.0 / task.drum.radius if scheme.reading == "drum" else 0.0
@@ -89,9 +64,9 @@ def pull_out_paper(task: PullOut, scheme: Paper) -> BoxHistory:
         ends = Ends(*velocity_at(task.tow_velocity, k * step), drum.inertia, drum.friction, False)
         report = NewtonReport(*paper_step(w, step, ends, wound, scheme.implicit, c))
         if report.outcome != CONVERGED:
-            return record.history(explain(report, k * step, _remedy(scheme)))
+            return record, explain(report, k * step, _remedy(scheme))
         record.add(k * step, w, report)
-    return record.history()
+    return record, ""
 
 
 def _remedy(scheme: Paper) -> str:
@@ -110,12 +85,8 @@ class Fixed(NamedTuple):
     drum: DrumNumbers
 
 
-def pull_out_boxes(task: PullOut, scheme: Equation7) -> BoxHistory:
-    """Pull cable off the drum with the second, independent formulation of second order.
-
-    Returns:
-        the history; a run that cannot go on is cut short and says so in `message`.
-    """
+def run_boxes(task: PullOut, scheme: Equation7) -> tuple[BoxRecord, str]:
+    """Pull cable off the drum with the second, independent formulation of second order; likewise."""
     c = equation7_numbers(uniform(task.cable), _uniform(task), stretch_momentum=0.0)
     fixed, record = Fixed(scheme.segment_length, c, task.drum.numbers()), BoxRecord(compliance=c.e)
     steps, step = _steps(task.duration, scheme.time_step)
@@ -127,9 +98,9 @@ def pull_out_boxes(task: PullOut, scheme: Equation7) -> BoxHistory:
         report = _advance(b, fixed, task.tow_velocity, k * step, step, MOST_HALVINGS)
         if report.outcome != CONVERGED:
             remedy = "another time_step or segment_length, or the default scheme (cable.MovingEnd)"
-            return record.history(explain(report, (k + 1) * step, remedy))
+            return record, explain(report, (k + 1) * step, remedy)
         record.add((k + 1) * step, b.boxes, report)
-    return record.history()
+    return record, ""
 
 
 def _advance(
@@ -163,42 +134,8 @@ def _uniform(task: PullOut) -> tuple[float, float, float]:
     return north, east, down
 
 
-COMPLETED = "completed"
 MOST_HALVINGS = 6
 """A failing step is halved this often before the run stops."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class BoxHistory:
-    """A run, one entry per time.
-
-    Attributes:
-        time: (n,) [s].
-        tow_force: force on the vehicle, earth axes. (n, 3) [N]
-        tow_tension: T at the vehicle. (n,) [N]
-        drum_tension: T at the drum. (n,) [N]
-        length: cable in the water. (n,) [m]
-        states: y = [T Vt Vn Vb α β] of every node, from the vehicle to the drum; (nodes, 6) per time.
-        positions: nodes relative to the drum, earth axes; (nodes, 3) per time. [m]
-        iterations: Newton iterations of the step that led to this time. (n,)
-        smallest_tension: of all nodes and times; below zero the cable would push. [N]
-        residual: largest scaled residual of any step, before its last Newton update. [-]
-        converged: whether the whole duration was run.
-        message: "completed", or when, where and why the run stopped, and what to try.
-    """
-
-    time: np.ndarray
-    tow_force: np.ndarray
-    tow_tension: np.ndarray
-    drum_tension: np.ndarray
-    length: np.ndarray
-    states: list[np.ndarray] = field(repr=False)
-    positions: list[np.ndarray] = field(repr=False)
-    iterations: np.ndarray
-    smallest_tension: float
-    residual: float
-    converged: bool
-    message: str
 
 
 @dataclass(kw_only=True)
@@ -208,10 +145,10 @@ class BoxRecord:
     Attributes:
         compliance: e of the cable. [1/N]
         times: so far. [s]
-        states: node states, copied at every time.
+        states: y = [T Vt Vn Vb α β] of every node, from the vehicle to the drum, copied at every time (nodes, 6).
         lengths: of the box before each node, copied at every time. [m]
         iterations: of Newton's method.
-        residual: the largest so far.
+        residual: the largest so far, scaled, before the last Newton update of a step. [-]
     """
 
     compliance: float
@@ -230,24 +167,27 @@ class BoxRecord:
         self.iterations.append(report.iterations)
         self.residual = max(self.residual, report.residual)
 
-    def history(self, message: str = COMPLETED) -> BoxHistory:
-        """Return the run so far, with the message that ended it."""
+    def history(self, way: np.ndarray, scheme: str, trouble: str) -> History:
+        """Return the run so far, of a tow point on its way (n, 3) [m]; `trouble` is the reason if it was stopped."""
         first = np.array([y[0] for y in self.states])
         directions = np.array([tangent(y[4], y[5]) for y in first])
         pairs = zip(self.states, self.lengths, strict=True)
-        return BoxHistory(
+        return History(
             time=np.array(self.times),
             tow_force=first[:, :1] * directions,
             tow_tension=first[:, 0],
             drum_tension=np.array([y[-1, 0] for y in self.states]),
             length=np.array([length[1:].sum() for length in self.lengths]),
-            states=self.states,
-            positions=[positions_of(y, length, self.compliance) for y, length in pairs],
-            iterations=np.array(self.iterations),
-            smallest_tension=min(float(y[:, 0].min()) for y in self.states),
-            residual=self.residual,
-            converged=message == COMPLETED,
-            message=message,
+            tow_point=way[: len(self.times)],
+            shapes=tuple(positions_of(y, length, self.compliance) for y, length in pairs),
+            tensions=tuple(y[:, 0] for y in self.states),
+            outcome=Outcome(
+                completed=not trouble,
+                message=trouble or "The run reached its end.",
+                iterations=sum(self.iterations),
+                worst_residual=self.residual,
+            ),
+            scheme=scheme,
         )
 
 
@@ -277,11 +217,6 @@ def explain(report: NewtonReport, time: float, remedy: str) -> str:
 
 def velocity_at(tow_velocity: Velocity, time: float) -> tuple[float, float, float]:
     """Return the tow point's velocity as three floats, or refuse it. [m/s]."""
-    given = tow_velocity(time)
-    numbers = [real(x) for x in given] if np.shape(given) == (3,) else [None]
-    if None in numbers:
-        raise BadValueError(
-            f"tow_velocity({time:g}) is {short(given)}; it must be three finite numbers, in m/s."
-        )
-    north, east, down = numbers
-    return north, east, down  # type: ignore[return-value]
+    given = three_numbers([tow_velocity(time)], "tow_velocity", np.array([time]))
+    north, east, down = given[0].tolist()
+    return north, east, down

@@ -3,9 +3,8 @@
 Nothing of `cable.moving_end` is used. What may be used from outside, to run a vehicle on it, stands in `__all__`.
 """
 
-from cable.lumped.history import Course, rope_off_drum
+from cable.lumped.history import Course, rope_off_drum, winch_rows
 from cable.lumped.rope import OLD, REST, STATE, Rope
-from cable.lumped.start import winch_rows
 from cable.lumped.step import GAMMA, accept_step, begin, try_step
 
 __all__ = [

@@ -105,12 +105,8 @@ def _slopes(rope: Rope, j: int, g: float, before: float, after: float, width: fl
 @compiled
 def _lengthen(rope: Rope, j: int, g: float, s: np.ndarray) -> None:
     """Add ∂R/∂U of the node before the drum: its lump grows, and its tangent turns to the longer side."""
-    near, far, by_payout, here = (
-        rope.spring[REST, j],
-        rope.spring[REST, j + 1],
-        rope.ends.by_payout,
-        rope.node,
-    )
+    near, far = rope.spring[REST, j], rope.spring[REST, j + 1]
+    by_payout, here = rope.ends.by_payout, rope.node
     for i in range(3):
         value = 0.5 * (here.momentum[i] / g + here.force[i])
         for m in range(3):

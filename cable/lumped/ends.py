@@ -136,12 +136,8 @@ def _drum_row(
     rope: Rope, g: float, c: CableNumbers, drum: DrumNumbers, flow: np.ndarray, flow_by_U: np.ndarray
 ) -> None:
     """Write the drum's equation, the last row."""
-    N, U, half, end = (
-        rope.ends.count,
-        rope.ends.payout[NEW],
-        0.5 * rope.spring[REST, rope.ends.count],
-        rope.drum,
-    )
+    N, U, end = rope.ends.count, rope.ends.payout[NEW], rope.drum
+    half = 0.5 * rope.spring[REST, N]
     row, by_V, Q = 3 * (N - 1), np.zeros(3), np.zeros(3)
     unit = unit_length(rope, N) * rope.ends.by_payout
     thinner = 0.5 * half * rope.ends.stretch / (1.0 + rope.ends.stretch * rope.spring[PULL, N])

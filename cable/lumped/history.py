@@ -14,14 +14,15 @@ import numpy as np
 from cable.current import Water
 from cable.drum import DrumNumbers, DrumProperties
 from cable.history import History, Outcome
-from cable.lumped.rope import OLD, PULL, REST, STATE, Rope, new_rope, unknowns
-from cable.lumped.start import held_at_drum, lay, steady_direction, steady_tensions, winch_rows
+from cable.lumped.nodes import FAINT
+from cable.lumped.rope import DIRECTION, OLD, PULL, REST, STATE, Rope, new_rope, unknowns
+from cable.lumped.springs import LEAST_COMPLIANCE, spring_law, spring_state
 from cable.lumped.step import GAMMA, START_OF_LEG, StageSolved, begin, take_step
 from cable.properties import CableNumbers, CableProperties
 from cable.schemes import Lumped
 from cable.task import PullOut, Tow, uniform
-from cable.tow_path import first_direction, sample_path, segments_needed
-from cable.winch import Brake, PayOutRate, Winch
+from cable.tow_path import first_direction, sample_path, segments_needed, steady_direction
+from cable.winch import SHORTEST, Brake, ConstantTension, PayOutRate, Winch
 
 AXES = ("northward", "eastward", "downward")
 
@@ -52,7 +53,7 @@ def tow(task: Tow, scheme: Lumped) -> History:
     count = max(1, int(np.ceil(task.length / scheme.segment_length - 1e-9)))
     rope, lengths = new_rope(count), np.full(count, task.length / count)
     J, tail_drag = task.current.at((0.0, 0.0, 0.0), 0.0), task.tail_drag
-    ahead = steady_direction(velocity[0] - J, first_direction(velocity - J), uniform(task.cable), tail_drag)
+    ahead = steady_direction(velocity - J, uniform(task.cable), tail_drag)
     place += task.length * ahead
     still = np.zeros((times.size, 4))
     course = Course(times, np.c_[place, still], np.c_[velocity, still])
@@ -110,6 +111,72 @@ def rope_off_drum(
     rope.ends.payout[:] = rope.ends.spin[:] = rate[0] if led else U
     rope.ends.tow_force[:], rope.ends.drum_pull = -(held + k * wet) * ahead, held
     return rope
+
+
+CRUMPLED = 1e-6
+"""Springs that pull with T are shorter by 1e-12 N/T of their length: a cable is laid no more than this too long. [m]"""
+
+
+def lay(
+    rope: Rope,
+    cable: CableProperties,
+    lengths: np.ndarray,
+    tensions: np.ndarray,
+    tow: np.ndarray,
+    ahead: np.ndarray,
+) -> None:
+    """Lay springs of given lengths and tensions (n,) straight behind the tow point, on all levels."""
+    n = lengths.size
+    rope.ends.count = n
+    least = max(FAINT, 1e-12 / CRUMPLED * float(lengths.sum()))
+    rope.ends.stretch = cable.compliance
+    rope.ends.compliance = max(cable.compliance, LEAST_COMPLIANCE)
+    rope.ends.bending = cable.bending_stiffness
+    rope.spring[REST, 1 : n + 1] = lengths
+    rope.ends.last[:] = lengths[-1]
+    behind = 0.0
+    rope.position[:, 0] = tow
+    for j in range(1, n + 1):
+        rope.spring[STATE, j] = spring_state(max(tensions[j - 1], least))
+        rope.spring[PULL, j], _, strain, _ = spring_law(rope.spring[STATE, j], rope.ends.compliance)
+        rope.stretched[:, j] = lengths[j - 1] * (1.0 + strain)
+        behind += rope.stretched[OLD, j]
+        rope.position[:, j] = tow - behind * ahead
+        rope.vector[DIRECTION, j] = -ahead
+
+
+def winch_rows(drum: DrumProperties | Winch, times: np.ndarray, wet: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the setpoint of a winch at times (n,), and its rate: dS/dt where the length is prescribed."""
+    if isinstance(drum, DrumProperties):
+        return np.zeros(times.size), np.zeros(times.size)
+    setpoint = drum.setpoints(times, wet)
+    if not isinstance(drum, PayOutRate):
+        return setpoint, np.gradient(setpoint, times)
+    rate = drum.rate
+    rates = np.array([float(rate(t) if callable(rate) else rate) for t in times])
+    return setpoint, np.where((setpoint <= SHORTEST) & (rates < 0.0), 0.0, rates)
+
+
+def held_at_drum(drum: DrumProperties | Winch, setpoint: float, payout: float) -> float:
+    """Return the tension at the drum that a run starts with: a winch's, or that of friction. [N]."""
+    if isinstance(drum, DrumProperties):
+        return drum.friction_torque / drum.radius if payout > 0.0 else 0.0
+    return setpoint if isinstance(drum, ConstantTension) else 0.0
+
+
+def steady_tensions(
+    U: np.ndarray, ahead: np.ndarray, cable: CableProperties, lengths: np.ndarray, tail: float
+) -> np.ndarray:
+    """Return the tensions at the nodes of a steady straight tow (n + 1,), √(1 + eT) in the drag and all. [N]."""
+    tensions = np.full(lengths.size + 1, tail)
+    drag, weight = cable.tangential_drag * abs(U @ ahead) * float(U @ ahead), cable.weight_in_water * ahead[2]
+    for j in range(lengths.size - 1, -1, -1):
+        here = tensions[j + 1]
+        for _ in range(4):
+            middle = max(0.5 * (here + tensions[j + 1]), 0.0)
+            here = tensions[j + 1] + lengths[j] * (drag * np.sqrt(1.0 + cable.compliance * middle) - weight)
+        tensions[j] = here
+    return tensions
 
 
 def _run(rope: Rope, course: Course, fixed: Fixed) -> History:

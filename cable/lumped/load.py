@@ -28,22 +28,16 @@ STILL = 1e-12
 class NodeLoad(Record):
     """Work space: p and f (3,), the drag in f (3,), ∂h/∂V and ∂h/∂t (3, 3), and the tangent with its slope."""
 
-    momentum: np.ndarray
-    force: np.ndarray
-    drag: np.ndarray
-    by_velocity: np.ndarray
-    by_tangent: np.ndarray
-    velocity: np.ndarray
-    water: np.ndarray
-    tangent: np.ndarray
-    across: np.ndarray
-    turning: np.ndarray
-
-
-def new_node_load() -> NodeLoad:
-    """Return empty work space."""
-    matrices = ("by_velocity", "by_tangent", "turning")
-    return NodeLoad(**{name: np.zeros((3, 3) if name in matrices else 3) for name in NodeLoad.names})
+    momentum: np.ndarray = np.zeros(3)
+    force: np.ndarray = np.zeros(3)
+    drag: np.ndarray = np.zeros(3)
+    by_velocity: np.ndarray = np.zeros((3, 3))
+    by_tangent: np.ndarray = np.zeros((3, 3))
+    velocity: np.ndarray = np.zeros(3)
+    water: np.ndarray = np.zeros(3)
+    tangent: np.ndarray = np.zeros(3)
+    across: np.ndarray = np.zeros(3)
+    turning: np.ndarray = np.zeros((3, 3))
 
 
 @inner

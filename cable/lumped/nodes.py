@@ -36,7 +36,7 @@ MERGE_AT = 0.5
 STRAIGHT = 0.8
 """The parabola is used while chords over lengths, and the cosine between them, are above this."""
 FAINT = 1e-11
-"""A new spring pulls at least this much. [N]"""
+"""A new spring, and one at the start, pulls at least this much. [N]"""
 
 
 @compiled

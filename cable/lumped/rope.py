@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cable.lumped.band_solver import WIDTH
-from cable.lumped.load import NodeLoad, new_node_load
+from cable.lumped.load import NodeLoad
 from subzero.jit import Record, compiled
 
 NEW, OLD, MIDDLE = 0, 1, 2
@@ -59,27 +59,27 @@ class RopeEnds(Record):
         wanted: setpoint of a winch: length [m] or tension [N].
     """
 
-    count: int
-    free_end: bool
-    compliance: float
-    stretch: float
-    bending: float
-    tail_drag: float
-    last: np.ndarray
-    payout: np.ndarray
-    loose: np.ndarray
-    spin: np.ndarray
-    since_loose: int
-    stage_end: float
-    payout_rate: float
-    start_last: float
-    start_payout: float
-    drum_place: np.ndarray
-    drum_velocity: np.ndarray
-    drum_pull: float
-    tow_force: np.ndarray
-    by_payout: float
-    wanted: float
+    count: int = 1
+    free_end: bool = False
+    compliance: float = 0.0
+    stretch: float = 0.0
+    bending: float = 0.0
+    tail_drag: float = 0.0
+    last: np.ndarray = np.zeros(3)
+    payout: np.ndarray = np.zeros(3)
+    loose: np.ndarray = np.zeros(3)
+    spin: np.ndarray = np.zeros(3)
+    since_loose: int = SMOOTH_STEPS
+    stage_end: float = 0.0
+    payout_rate: float = 0.0
+    start_last: float = 0.0
+    start_payout: float = 0.0
+    drum_place: np.ndarray = np.zeros(3)
+    drum_velocity: np.ndarray = np.zeros(3)
+    drum_pull: float = 0.0
+    tow_force: np.ndarray = np.zeros(3)
+    by_payout: float = 0.0
+    wanted: float = 0.0
 
 
 class Rope(NamedTuple):
@@ -112,40 +112,17 @@ class Rope(NamedTuple):
 def new_rope(capacity: int) -> Rope:
     """Return an empty rope with space for `capacity` springs."""
     n = capacity + 2
-    ends = RopeEnds(
-        count=1,
-        free_end=False,
-        compliance=0.0,
-        stretch=0.0,
-        bending=0.0,
-        tail_drag=0.0,
-        last=np.zeros(3),
-        payout=np.zeros(3),
-        loose=np.zeros(3),
-        spin=np.zeros(3),
-        since_loose=SMOOTH_STEPS,
-        stage_end=0.0,
-        payout_rate=0.0,
-        start_last=0.0,
-        start_payout=0.0,
-        drum_place=np.zeros(3),
-        drum_velocity=np.zeros(3),
-        drum_pull=0.0,
-        tow_force=np.zeros(3),
-        by_payout=0.0,
-        wanted=0.0,
-    )
     return Rope(
-        ends=ends,
+        ends=RopeEnds(),
         position=np.zeros((3, n, 3)),
         velocity=np.zeros((3, n, 3)),
         momentum=np.zeros((3, n, 3)),
         stretched=np.zeros((3, n)),
         spring=np.zeros((9, n)),
         vector=np.zeros((7, n, 3)),
-        node=new_node_load(),
-        middle=new_node_load(),
-        drum=new_node_load(),
+        node=NodeLoad(),
+        middle=NodeLoad(),
+        drum=NodeLoad(),
         band=np.zeros((3 * n, WIDTH)),
         right=np.zeros(3 * n),
     )

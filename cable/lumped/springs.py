@@ -25,6 +25,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from cable.drum import CREEP
 from cable.lumped.band_solver import add
 from cable.lumped.rope import (
     ANSWER,
@@ -123,24 +124,16 @@ def pull_nodes(rope: Rope, g: float) -> None:
                 )
                 for k in range(3):
                     same = 1.0 if i == k else 0.0
-                    turn = (
-                        g
-                        * T
-                        * (same - rope.vector[DIRECTION, j, i] * rope.vector[DIRECTION, j, k])
-                        / rope.spring[SIZE, j]
-                    )
+                    across = same - rope.vector[DIRECTION, j, i] * rope.vector[DIRECTION, j, k]
+                    turn = g * T * across / rope.spring[SIZE, j]
                     value = by_T * rope.spring[GAIN, j] * rope.vector[ANSWER, j, k] + sign * turn
                     if j <= held:
                         add(rope.band, row, 3 * (j - 1) + k, value)
                     if j > 1:
                         add(rope.band, row, 3 * (j - 2) + k, -value)
                 if j == N and not rope.ends.free_end:
-                    add(
-                        rope.band,
-                        row,
-                        column,
-                        -by_T * rope.spring[GAIN, j] * unit_length(rope, j) * rope.ends.by_payout,
-                    )
+                    by_U = -by_T * rope.spring[GAIN, j] * unit_length(rope, j) * rope.ends.by_payout
+                    add(rope.band, row, column, by_U)
 
 
 @inner
@@ -171,8 +164,6 @@ SLACKNESS = 1.0
 """k: how far ξ falls for a shortening of one. [N]"""
 CORNER = 2e-6
 """c: where taut and slack meet. [N]"""
-CREEP = 1e-3
-"""Pay-out rate at which the drum's friction has come to 0.7 of its full size. [m/s]"""
 
 
 @compiled

@@ -60,6 +60,7 @@ from cable.moving_end.state import (
     UPPER,
     Line,
     held_node,
+    length_at,
     select_section,
     wet_at_new,
 )
@@ -109,16 +110,16 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
     node_velocities(line, w)
     N, held = line.ends.count, held_node(line)
     _clear(line, slopes)
-    ahead = measured_chord(line.position[NEW], 1, _length(line, 1))
+    ahead = measured_chord(line.position[NEW], 1, length_at(line, NEW, 1))
     for j in range(1, N + 1):
-        length, T = _length(line, j), line.tension[NEW, j]
+        length, T = length_at(line, NEW, j), line.tension[NEW, j]
         select_section(line, c, j)
         wet_at_new(line, c, j)
         work.square, work.chord_length, work.shorter = ahead
         by_strain = _length_equation(line, j, T, w, c, work.square, slopes)
         take_segment(line.position[NEW], line.velocity[NEW], line.water[NEW], j, work)
         beyond = min(j + 1, N)
-        ahead = measured_chord(line.position[NEW], beyond, _length(line, beyond))
+        ahead = measured_chord(line.position[NEW], beyond, length_at(line, NEW, beyond))
         evaluate_load(T, line.slip[j], line.normal_gain[j], w.a0, c, work)
         for i in range(3):
             work.q[i] -= line.forcing[j, i]
@@ -153,12 +154,6 @@ def _fill(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load
     add_surface(line, c, w, slopes)
     if N == 1 and drum.control == FREE and not line.ends.layout.free_end:
         write_single_segment(line, work.chord)
-
-
-@inlined
-def _length(line: Line, j: int) -> float:
-    """Return the unstretched length of segment j at level NEW. [m]."""
-    return line.ends.last_length[NEW] if j == line.ends.count else line.length[j]
 
 
 @inlined
@@ -243,8 +238,7 @@ def _keep_tow_force(line: Line, slopes: bool) -> None:
 @inlined
 def _sharpen_tow_force(line: Line) -> None:
     """Take the load of the first half segment at its own middle, a quarter into the segment, by extrapolation."""
-    first = line.length[1]
-    second = line.ends.last_length[NEW] if line.ends.count == 2 else line.length[2]
+    first, second = line.length[1], length_at(line, NEW, 2)
     # q(ℓ₁/4) on the line through q(ℓ₁/2) and q(ℓ₁ + ℓ₂/2), times ℓ₁/2, less what `_add_balance` took. Its slopes are
     # left out of `by_tow` and `by_block`: hull and cable agree on the force itself, those only say where to look.
     share = 0.25 * first * first / (first + second)
@@ -283,7 +277,7 @@ def _past_stretch(line: Line, j: int, w: Weights) -> tuple[float, float]:
 @inlined
 def _stretch_at(line: Line, level: int, j: int) -> float:
     """Return ε⁺ of segment j at a level; none of a last one that was not out of the drum then. [-]."""
-    length = line.ends.last_length[level] if j == line.ends.count else line.length[j]
+    length = length_at(line, level, j)
     if length <= 0.0:
         return 0.0
     square, _, _ = measured_chord(line.position[level], j, length)

@@ -21,7 +21,21 @@ from math import sqrt
 import numpy as np
 
 from cable.moving_end.block_solver import factor_wide, solve, solve_wide
-from cable.moving_end.state import DIAGONAL, LOWER, LOWER2, NEW, NOW, RESIDUAL, UPPER, UPPER2, Line, held_node
+from cable.moving_end.state import (
+    DIAGONAL,
+    LOWER,
+    LOWER2,
+    NEW,
+    NOW,
+    RESIDUAL,
+    UPPER,
+    UPPER2,
+    Line,
+    held_node,
+    length_at,
+    no_change,
+    no_energy,
+)
 from cable.properties import CableNumbers, ClampedCableNumbers, StiffCableNumbers
 from subzero.jit import allocating, by_field, compiled, inner
 
@@ -69,8 +83,7 @@ def _spring(line: Line, j: int, stiffness: float) -> float:
     if j < 1 or j >= N:
         return 0.0
     # The length of level NOW, since ℓ̄ of the growing segment is taken from the step before.
-    far = line.ends.last_length[NOW] if j + 1 == N else line.length[j + 1]
-    return 2.0 * stiffness / (line.length[j] + far)
+    return 2.0 * stiffness / (line.length[j] + length_at(line, NOW, j + 1))
 
 
 @allocating
@@ -142,9 +155,7 @@ def _add_to_matrix(line: Line, j: int, i: int, k: int, A: float, B: float, C: fl
 def _end_spring(line: Line, c: ClampedCableNumbers, end: int) -> tuple[int, float]:
     """Return the segment at an end and k of its clamp. [N m]"""
     j = line.ends.count if end else 1
-    return j, 2.0 * c.bending_stiffness / (
-        line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
-    )
+    return j, 2.0 * c.bending_stiffness / length_at(line, NOW, j)
 
 
 @inner
@@ -188,11 +199,6 @@ def _clamp_energy(line: Line, c: ClampedCableNumbers) -> float:
 
 
 @inner
-def _no_bending(line: Line, c: CableNumbers) -> None:
-    """Add nothing."""
-
-
-@inner
 def _energy(line: Line, c: StiffCableNumbers) -> float:
     """Return E_B at level NOW. [J]."""
     total, x = 0.0, line.position[NOW]
@@ -204,12 +210,6 @@ def _energy(line: Line, c: StiffCableNumbers) -> float:
             along += (x[j, i] - x[j - 1, i]) * (x[j + 1, i] - x[j, i])
         total += _spring(line, j, c.bending_stiffness) * (1.0 - along / sqrt(max(near * far, 1e-30)))
     return total
-
-
-@inner
-def _no_energy(line: Line, c: CableNumbers) -> float:
-    """Return none. [J]."""
-    return 0.0
 
 
 @inner
@@ -254,9 +254,9 @@ def keep_tow_answer(line: Line) -> None:
             line.ends.tow.answer[k, m] = line.blocks[LOWER, 1, m, 1 + k]
 
 
-add_bending = by_field("bending_stiffness", _add_bending, _no_bending)
+add_bending = by_field("bending_stiffness", _add_bending, no_change)
 solve_for_step = by_field("bending_stiffness", _stiff_solve, _solve)
 has_residual = by_field("bending_stiffness", _no_residual, _has_residual)
-bending_energy = by_field("bending_stiffness", _energy, _no_energy)
-add_clamps = by_field("clamp", _add_clamps, _no_bending)
-clamp_energy = by_field("clamp", _clamp_energy, _no_energy)
+bending_energy = by_field("bending_stiffness", _energy, no_energy)
+add_clamps = by_field("clamp", _add_clamps, no_change)
+clamp_energy = by_field("clamp", _clamp_energy, no_energy)

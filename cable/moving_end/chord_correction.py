@@ -35,7 +35,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cable.moving_end.slack_law import chord_length, squared_share
-from cable.moving_end.state import NEW, NOW, Line
+from cable.moving_end.state import NEW, NOW, Line, length_at
 from subzero.jit import inlined, inner, scratch
 
 if TYPE_CHECKING:
@@ -92,11 +92,11 @@ def _turning_angle(line: Line, j: int, before: np.ndarray, after: np.ndarray, th
 
     `before` and `after` (3,) are the tangents of its neighbours; where there is none, its own.
     """
-    length, span = _length(line, j), 0.0
+    length, span = length_at(line, NEW, j), 0.0
     if j > 1:
-        span += 0.5 * (_length(line, j - 1) + length)
+        span += 0.5 * (length_at(line, NEW, j - 1) + length)
     if j < line.ends.count:
-        span += 0.5 * (length + _length(line, j + 1))
+        span += 0.5 * (length + length_at(line, NEW, j + 1))
     share, square = (length / span if span > 0.0 else 0.0), 0.0
     for i in range(3):
         theta[i] = share * (after[i] - before[i])
@@ -109,17 +109,11 @@ def _turning_angle(line: Line, j: int, before: np.ndarray, after: np.ndarray, th
 
 
 @inlined
-def _length(line: Line, j: int) -> float:
-    """Return the predicted length of segment j. [m]."""
-    return line.ends.last_length[NEW] if j == line.ends.count else line.length[j]
-
-
-@inlined
 def _tangent(line: Line, j: int, out: np.ndarray) -> None:
     """Fill the predicted tangent of segment j (3,)."""
     for i in range(3):
         out[i] = line.position[NEW, j, i] - line.position[NEW, j - 1, i]
-    length = _length(line, j)
+    length = length_at(line, NEW, j)
     r = chord_length(squared_share(out, length), length)
     for i in range(3):
         out[i] /= r

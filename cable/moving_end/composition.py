@@ -23,6 +23,8 @@ from cable.moving_end.state import (
     find_section,
     held_node,
     length_at,
+    no_change,
+    no_change_in_step,
 )
 from cable.moving_end.wetting import dry_sphere
 from cable.properties import CableNumbers, SectionedCableNumbers
@@ -92,11 +94,6 @@ def _load_nodes(line: Line, c: SectionedCableNumbers, w: Weights, slopes: bool) 
 
 
 @inner
-def _load_nothing(line: Line, c: CableNumbers, w: Weights, slopes: bool) -> None:
-    """Add nothing."""
-
-
-@inner
 def _add_mass(line: Line, c: SectionedCableNumbers) -> None:
     """Add the bodies to the masses that a jolt moves."""
     for b in range(c.body_count):
@@ -105,11 +102,6 @@ def _add_mass(line: Line, c: SectionedCableNumbers) -> None:
             line.blocks[DIAGONAL, j, 1 + i, 1 + i] += (
                 c.body[b, 0] + (1.0 - dry_body(line, c, b)[0]) * c.body[b, 1]
             )
-
-
-@inner
-def _add_no_mass(line: Line, c: CableNumbers) -> None:
-    """Add nothing."""
 
 
 @inner
@@ -153,8 +145,8 @@ def _none_carried(line: Line, c: CableNumbers, j: int) -> float:
 
 
 carried_weight = by_field_at("section_end", _carried, _none_carried)
-add_bodies = by_field_in_step("section_end", _load_nodes, _load_nothing)
-add_body_masses = by_field("section_end", _add_mass, _add_no_mass)
+add_bodies = by_field_in_step("section_end", _load_nodes, no_change_in_step)
+add_body_masses = by_field("section_end", _add_mass, no_change)
 body_flow = by_field("section_end", _flow, _no_flow)
 
 
@@ -163,12 +155,8 @@ def steady_tow(line: Line, c: SectionedCableNumbers, U: np.ndarray, tail_drag: f
 
     The force at the far node of a segment and half of its load give its tangent, and that its load: a fixed point.
     """
-    N, x, speed, down = (
-        int(line.ends.count),
-        line.position[NOW],
-        float(np.linalg.norm(U)),
-        np.array([0.0, 0.0, 1.0]),
-    )
+    N, x = int(line.ends.count), line.position[NOW]
+    speed, down = float(np.linalg.norm(U)), np.array([0.0, 0.0, 1.0])
     nodes = [body_node(line, c, b) for b in range(int(c.body_count))]
     force, x[N] = -tail_drag * speed * U, 0.0
     t = -U / speed if speed > 0.0 else down

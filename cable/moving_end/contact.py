@@ -19,8 +19,20 @@ from math import sqrt
 import numpy as np
 
 from cable.moving_end.bdf2 import Weights
-from cable.moving_end.state import DIAGONAL, NEW, NOW, RESIDUAL, Line, held_node, select_section
-from cable.properties import CableNumbers, LaidCableNumbers
+from cable.moving_end.state import (
+    DIAGONAL,
+    NEW,
+    NOW,
+    RESIDUAL,
+    Line,
+    held_node,
+    length_at,
+    no_change,
+    no_change_in_step,
+    no_energy,
+    select_section,
+)
+from cable.properties import LaidCableNumbers
 from subzero.jit import by_field, by_field_in_step, compiled, inlined, inner, scratch
 
 LEFT = 0.01
@@ -32,11 +44,8 @@ SHORT = 1e-12
 @inlined
 def carried_length(line: Line, j: int) -> float:
     """Return ℓ̄ of node j at level NOW. [m]."""
-    N = line.ends.count
-    near = line.ends.last_length[NOW] if j == N else line.length[j]
-    if j == N:
-        return 0.5 * near
-    return 0.5 * (near + (line.ends.last_length[NOW] if j + 1 == N else line.length[j + 1]))
+    far = length_at(line, NOW, j + 1) if j < line.ends.count else 0.0
+    return 0.5 * (length_at(line, NOW, j) + far)
 
 
 @inlined
@@ -137,21 +146,11 @@ def _stick_or_slide(line: Line, j: int, N: float, slope: float, c: LaidCableNumb
 
 
 @inner
-def _no_bed(line: Line, c: CableNumbers, w: Weights, slopes: bool) -> None:
-    """Add nothing."""
-
-
-@inner
 def _keep_friction(line: Line, c: LaidCableNumbers) -> None:
     """Make the friction at level NEW that of level NOW."""
     for j in range(line.ends.count + 1):
         for i in range(3):
             line.friction[NOW, j, i] = line.friction[NEW, j, i]
-
-
-@inner
-def _keep_nothing(line: Line, c: CableNumbers) -> None:
-    """Keep nothing."""
 
 
 @inner
@@ -173,15 +172,9 @@ def _power_to_bed(line: Line, c: LaidCableNumbers) -> float:
     return power
 
 
-@inner
-def _no_power(line: Line, c: CableNumbers) -> float:
-    """Return none. [W]."""
-    return 0.0
-
-
-add_contact = by_field_in_step("bed_stiffness", _press, _no_bed)
-keep_friction = by_field("bed_stiffness", _keep_friction, _keep_nothing)
-power_to_bed = by_field("bed_stiffness", _power_to_bed, _no_power)
+add_contact = by_field_in_step("bed_stiffness", _press, no_change_in_step)
+keep_friction = by_field("bed_stiffness", _keep_friction, no_change)
+power_to_bed = by_field("bed_stiffness", _power_to_bed, no_energy)
 
 
 def friction_at_rest(line: Line, c: LaidCableNumbers, friction: float) -> np.ndarray:

@@ -69,19 +69,9 @@ def energy_flow(line: Line, c: CableNumbers, work: Load, out: np.ndarray) -> Non
         added -= c.added_mass * work.along * turn * length / work.chord_length
         carried += length * (c.mass - mass_along(line, c)) * _carried(line, j)
     lost, held, fallen = body_flow(line, c)
-    out[LOSS], out[STORED], out[GRAVITY_WORK], out[ADDED_MASS] = (
-        loss + lost,
-        energy + held,
-        sunk + fallen,
-        added,
-    )
-    out[STRAINED], out[CARRIED], out[AT_DRUM], out[TOWED] = (
-        strained,
-        carried + wetted_power(line, c),
-        0.0,
-        0.0,
-    )
-    out[DAMPED], out[TO_BED] = damped, power_to_bed(line, c)
+    out[LOSS], out[STORED], out[GRAVITY_WORK] = loss + lost, energy + held, sunk + fallen
+    out[ADDED_MASS], out[STRAINED], out[CARRIED] = added, strained, carried + wetted_power(line, c)
+    out[AT_DRUM], out[TOWED], out[DAMPED], out[TO_BED] = 0.0, 0.0, damped, power_to_bed(line, c)
     out[STORED] += bending_energy(line, c) + clamp_energy(line, c) + surface_energy(line, c)
     _flow_at_ends(line, c, out)
 

@@ -30,9 +30,8 @@ from cable.moving_end.chord_correction import correct_for_arc
 from cable.moving_end.composition import carried_weight
 from cable.moving_end.remeshing import fill_node_tensions
 from cable.moving_end.segment_load import Load, evaluate_load, measured_chord, segment_momentum, take_segment
-from cable.moving_end.slack_law import SMOOTHING, SOFTEST
 from cable.moving_end.state import BEFORE, NEW, NOW, Line, length_at, sample_water, select_section
-from cable.moving_end.time_step import solve_step
+from cable.moving_end.time_step import solve_softened, solve_step
 from cable.properties import CableNumbers
 from cable.schemes import TOLERANCE
 from subzero.jit import allocating, compiled, inner
@@ -317,14 +316,7 @@ def _step_from_rest(
         if solve_step(line, w, c, drum, work, False):
             return True
     _guess(line, water, work)
-    line.ends.solver.smoothing = SOFTEST
-    while True:
-        converged = solve_step(line, w, c, drum, work, False)
-        if not converged or line.ends.solver.smoothing <= SMOOTHING:
-            break
-        line.ends.solver.smoothing = max(0.1 * line.ends.solver.smoothing, SMOOTHING)
-    line.ends.solver.smoothing = SMOOTHING
-    return converged
+    return solve_softened(line, w, c, drum, work)
 
 
 @inner

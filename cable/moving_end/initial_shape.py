@@ -27,7 +27,7 @@ from cable.moving_end.state import (
 from cable.properties import CableNumbers
 from cable.sea_bed import SeaBed
 from cable.sections import AnyCable, SectionedCable, check_length
-from cable.tow_path import first_direction, segments_needed
+from cable.tow_path import first_direction, segments_needed, steady_direction
 from subzero.jit import compiled
 
 
@@ -140,26 +140,7 @@ def start_in_water(line: Line, water: Water, c: CableNumbers, work: Load) -> Non
             segment_momentum(line, level, j, length, c, work)
 
 
-def steady_direction(velocity: np.ndarray, J: np.ndarray, cable: AnyCable, tail_drag: float) -> np.ndarray:
-    """Return the direction from the tail to the tow point in a steady tow, a unit vector (3,)."""
-    speed, weight = float(np.linalg.norm(velocity[0] - J)), cable.weight_in_water
-    # A cable at rest in the water hangs straight down, or up if it is buoyant.
-    if speed == 0.0 and weight != 0.0:
-        return np.array([0.0, 0.0, -np.sign(weight)])
-    ahead = first_direction(velocity - J)
-    if (
-        isinstance(cable, SectionedCable)
-        or weight == 0.0
-        or tail_drag > 0.0
-        or speed == 0.0
-        or abs(ahead[2]) > 1e-9
-    ):
-        return ahead
-    phi = cable.critical_angle(speed)
-    return np.cos(phi) * ahead + np.array([0.0, 0.0, -np.sign(weight) * np.sin(phi)])
-
-
-def set_steady_tow(
+def _set_steady_tow(
     line: Line, velocity: np.ndarray, J: np.ndarray, cable: AnyCable, tail_drag: float, each: float
 ) -> None:
     """Give every node the tow point's velocity, and the segments tension and stretch of a steady tow: a straight one,
@@ -208,14 +189,10 @@ def division(cable: AnyCable, length: float, each: float) -> int:
     return max(1, int(np.ceil(length / each - 1e-9)))
 
 
-def trail_on_bed(line: Line, bed: SeaBed | None) -> None:
-    """Lay what would begin below the bed on it, in the direction in which it would have gone."""
+def trail(line: Line, bed: SeaBed | None, surface: float | None) -> None:
+    """Lay what would begin below the bed, or above the surface, on it, in the direction in which it would have gone."""
     if bed is not None:
-        _trail(line, lambda places: bed.below(places), bed.normal)
-
-
-def trail_on_surface(line: Line, surface: float | None) -> None:
-    """Lay what would begin above the surface on it, likewise."""
+        _trail(line, bed.below, bed.normal)
     if surface is not None:
         _trail(line, lambda places: surface - np.atleast_2d(places)[:, 2], np.array([0.0, 0.0, -1.0]))
 
@@ -259,15 +236,24 @@ def straight_between(
     return line
 
 
-def towed_from(
-    cable: AnyCable, state: np.ndarray, length: float, each: float, J: np.ndarray, tail_drag: float
-) -> tuple[Line, np.ndarray]:
-    """Return a line that is towed steadily, and the place from which its places are counted: that of its tail."""
+def towed(
+    cable: AnyCable, velocity: np.ndarray, length: float, each: float, J: np.ndarray, tail_drag: float
+) -> Line:
+    """Return a line that is towed steadily, its places counted from its tail.
+
+    Args:
+        cable: the cable.
+        velocity: of the tow point, from the start on (n, 3). [m/s]
+        length: L. [m]
+        each: length of its segments. [m]
+        J: velocity of the water (3,). [m/s]
+        tail_drag: ½ρC_dA of a drogue. [kg/m]
+    """
     count = division(cable, length, each)
     line = new_line(count)
     line.ends.layout.segment_length = length / count
-    uphill = steady_direction(state[1:], J, cable, tail_drag)
-    lay_straight(line, length, uphill, state[1], DrumNumbers.at_rest(), cable.numbers())
+    uphill = steady_direction(velocity - J, cable, tail_drag)
+    lay_straight(line, length, uphill, velocity[0], DrumNumbers(), cable.numbers())
     line.ends.layout.free_end, line.ends.layout.tail_drag = True, tail_drag
-    set_steady_tow(line, state[1], J, cable, tail_drag, each)
-    return line, state[0] - line.position[NOW, 0]
+    _set_steady_tow(line, velocity[0], J, cable, tail_drag, each)
+    return line

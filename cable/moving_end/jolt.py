@@ -115,13 +115,8 @@ def _assemble(
     line: Line, tangents: np.ndarray, change: np.ndarray, c: CableNumbers, drum: DrumNumbers, M: np.ndarray
 ) -> None:
     """Fill matrix and right-hand side for the impulses and jumps of all blocks; ΔV_0 is `change`."""
-    N, L, D, U, r = (
-        line.ends.count,
-        line.blocks[LOWER],
-        line.blocks[DIAGONAL],
-        line.blocks[UPPER],
-        line.rows[RESIDUAL],
-    )
+    L, D, U = line.blocks[LOWER], line.blocks[DIAGONAL], line.blocks[UPPER]
+    N, r = line.ends.count, line.rows[RESIDUAL]
     for j in range(1, N + 1):
         for i in range(4):
             r[j, i] = 0.0

@@ -18,7 +18,6 @@ is singular, and a turned motion gives turned forces.
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any
 
 import numpy as np
 
@@ -43,35 +42,30 @@ class Load(Record):
             the unknowns of its own block (3, 4), see `assembly`.
     """
 
-    velocity: np.ndarray
-    water: np.ndarray
-    chord: np.ndarray
-    tangent: np.ndarray
-    momentum: np.ndarray
-    drag: np.ndarray
-    q: np.ndarray
-    across: np.ndarray
-    along: float
-    side: float
-    square: float
-    chord_length: float
-    shorter: float
-    kt: float
-    kn: float
-    q_V: np.ndarray
-    q_d: np.ndarray
-    q_tt: np.ndarray
-    by_near: np.ndarray
-    by_far: np.ndarray
+    velocity: np.ndarray = np.zeros(3)
+    water: np.ndarray = np.zeros(3)
+    chord: np.ndarray = np.zeros(3)
+    tangent: np.ndarray = np.zeros(3)
+    momentum: np.ndarray = np.zeros(3)
+    drag: np.ndarray = np.zeros(3)
+    q: np.ndarray = np.zeros(3)
+    across: np.ndarray = np.zeros(3)
+    along: float = 0.0
+    side: float = 0.0
+    square: float = 0.0
+    chord_length: float = 0.0
+    shorter: float = 0.0
+    kt: float = 0.0
+    kn: float = 0.0
+    q_V: np.ndarray = np.zeros((3, 3))
+    q_d: np.ndarray = np.zeros((3, 3))
+    q_tt: np.ndarray = np.zeros(3)
+    by_near: np.ndarray = np.zeros((3, 3))
+    by_far: np.ndarray = np.zeros((3, 4))
 
 
-@made_once
-def new_load() -> Load:
-    """Return empty work space for one segment."""
-    parts: dict[str, Any] = {name: np.zeros(3) for name in Load.names}
-    parts |= {name: np.zeros((3, 3)) for name in ("q_V", "q_d", "by_near")}
-    parts |= dict.fromkeys(("along", "side", "square", "chord_length", "shorter", "kt", "kn"), 0.0)
-    return Load(**parts | {"by_far": np.zeros((3, 4))})
+new_load = made_once(Load)
+"""Return empty work space for one segment."""
 
 
 @inlined

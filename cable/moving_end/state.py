@@ -107,12 +107,12 @@ class Tow(Record):
             (3, 4), from the last Newton matrix.
     """
 
-    force: np.ndarray
-    past: np.ndarray
-    largest: float
-    by_tow: np.ndarray
-    by_block: np.ndarray
-    answer: np.ndarray
+    force: np.ndarray = np.zeros(3)
+    past: np.ndarray = np.zeros((2, 3))
+    largest: float = 0.0
+    by_tow: np.ndarray = np.zeros((3, 3))
+    by_block: np.ndarray = np.zeros((3, 4))
+    answer: np.ndarray = np.zeros((3, 4))
 
 
 class Ends(Record):
@@ -139,24 +139,24 @@ class Ends(Record):
         solved: how the last step that was tried was solved.
     """
 
-    count: int
-    settled: float
-    last_length: np.ndarray
-    payout: np.ndarray
-    loose: np.ndarray
-    ahead: np.ndarray
-    since_loose: int
-    drum_mode: int
-    drum_pull: float
-    drum_force: np.ndarray
-    drum_velocity: np.ndarray
-    origin: np.ndarray
-    time: float
-    previous_step: float
-    layout: Layout
-    tow: Tow
-    solver: Solver
-    solved: Solved
+    count: int = 0
+    settled: float = 0.0
+    last_length: np.ndarray = np.zeros(3)
+    payout: np.ndarray = np.zeros(3)
+    loose: np.ndarray = np.zeros(3)
+    ahead: np.ndarray = np.zeros(3)
+    since_loose: int = KNOWN_STEPS  # no cable was loose yet, so rates are of second order from the start
+    drum_mode: int = TURNING
+    drum_pull: float = 0.0
+    drum_force: np.ndarray = np.zeros(3)
+    drum_velocity: np.ndarray = np.zeros(3)
+    origin: np.ndarray = np.zeros(3)
+    time: float = 0.0
+    previous_step: float = 0.0
+    layout: Layout = Layout()
+    tow: Tow = Tow()
+    solver: Solver = Solver()
+    solved: Solved = Solved()
 
 
 class Line(NamedTuple):
@@ -211,39 +211,7 @@ def new_line(capacity: int) -> Line:
     return Line(ends=_new_ends(), **_per_node(capacity + 1))
 
 
-@made_once
-def _new_ends() -> Ends:
-    """Return the fields of an empty line that exist once."""
-    tow = Tow(
-        force=np.zeros(3),
-        past=np.zeros((2, 3)),
-        largest=0.0,
-        by_tow=np.zeros((3, 3)),
-        by_block=np.zeros((3, 4)),
-        answer=np.zeros((3, 4)),
-    )
-    return Ends(
-        count=0,
-        settled=0.0,
-        last_length=np.zeros(3),
-        payout=np.zeros(3),
-        loose=np.zeros(3),
-        ahead=np.zeros(3),
-        # No cable was loose yet, so rates are of second order from the start.
-        since_loose=KNOWN_STEPS,
-        drum_mode=TURNING,
-        drum_pull=0.0,
-        drum_force=np.zeros(3),
-        drum_velocity=np.zeros(3),
-        origin=np.zeros(3),
-        time=0.0,
-        # 0: there is no earlier level.
-        previous_step=0.0,
-        layout=Layout(),
-        tow=tow,
-        solver=Solver(),
-        solved=Solved(),
-    )
+_new_ends = made_once(Ends)
 
 
 def _per_node(n: int) -> dict[str, Any]:
@@ -350,11 +318,27 @@ def find_section(line: Line, c: SectionedCableNumbers, j: int) -> None:
 
 
 @inner
-def _is_uniform(line: Line, c: CableNumbers, j: int) -> None:
-    """Select nothing."""
+def no_change(line: Line, c: CableNumbers) -> None:
+    """Do nothing, for a cable that lacks a field; so do the two that follow, and the fourth has no energy."""
 
 
-_select_row = by_field_at("section_end", find_section, _is_uniform)
+@inner
+def no_change_at(line: Line, c: CableNumbers, j: int) -> None:
+    """Do nothing."""
+
+
+@inner
+def no_change_in_step(line: Line, c: CableNumbers, w: Any, slopes: bool) -> None:
+    """Do nothing."""
+
+
+@inner
+def no_energy(line: Line, c: CableNumbers) -> float:
+    """Return none. [J], [W]"""
+    return 0.0
+
+
+_select_row = by_field_at("section_end", find_section, no_change_at)
 
 
 @inner
@@ -366,7 +350,7 @@ def _find_whole_section(line: Line, c: Any, j: int) -> None:
     c.whole[3], c.whole[4], c.whole[5], c.whole[6] = row[5], row[6], row[10], row[11]
 
 
-find_whole = by_field_at("section_end", _find_whole_section, _is_uniform)
+find_whole = by_field_at("section_end", _find_whole_section, no_change_at)
 """Fill `FloatingCableNumbers.whole` for a segment."""
 
 
@@ -408,5 +392,5 @@ def _all_wet(line: Line, c: CableNumbers, j: int) -> None:
 select_section = by_field_at("surface_level", _wet_now, _all_wet)
 """Make the numbers of a cable describe the section of a segment, and its wetted share at level NOW; a uniform cable in
 water everywhere compiles nothing of it."""
-wet_at_new = by_field_at("surface_level", _wet_new, _is_uniform)
+wet_at_new = by_field_at("surface_level", _wet_new, no_change_at)
 """Do the same for the wetted share at level NEW."""

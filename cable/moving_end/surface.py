@@ -28,9 +28,11 @@ from cable.moving_end.state import (
     find_whole,
     held_node,
     length_at,
+    no_change_in_step,
+    no_energy,
 )
 from cable.moving_end.wetting import dry_energy, dry_segment
-from cable.properties import CableNumbers, FloatingCableNumbers
+from cable.properties import FloatingCableNumbers
 from subzero.jit import by_field, by_field_in_step, compiled, inner, scratch
 
 
@@ -90,11 +92,6 @@ def _water_per_share(line: Line, c: FloatingCableNumbers, w: Weights, j: int, ou
 
 
 @inner
-def _in_water(line: Line, c: CableNumbers, w: Weights, slopes: bool) -> None:
-    """Add nothing."""
-
-
-@inner
 def _dry_energy(line: Line, c: FloatingCableNumbers) -> float:
     """Return the energy of all segments by being dry, at level NOW. [J]."""
     total = 0.0
@@ -134,12 +131,6 @@ def _wetted_power(line: Line, c: FloatingCableNumbers) -> float:
     return power
 
 
-@inner
-def _none(line: Line, c: CableNumbers) -> float:
-    """Return none."""
-    return 0.0
-
-
-add_surface = by_field_in_step("surface_level", _float, _in_water)
-surface_energy = by_field("surface_level", _dry_energy, _none)
-wetted_power = by_field("surface_level", _wetted_power, _none)
+add_surface = by_field_in_step("surface_level", _float, no_change_in_step)
+surface_energy = by_field("surface_level", _dry_energy, no_energy)
+wetted_power = by_field("surface_level", _wetted_power, no_energy)

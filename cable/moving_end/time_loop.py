@@ -27,11 +27,9 @@ from cable.moving_end.initial_shape import (
     division,
     lay_held,
     lay_straight,
-    set_steady_tow,
     start_in_water,
-    steady_direction,
-    trail_on_bed,
-    trail_on_surface,
+    towed,
+    trail,
 )
 from cable.moving_end.jolt import take_jolt
 from cable.moving_end.remeshing import accept, end_tensions
@@ -260,28 +258,19 @@ def tow(task: Tow, scheme: MovingEnd) -> History:
     """Tow a cable of fixed length, as `cable.tow` does."""
     path = sample_path(task.tow_velocity, task.duration, scheme.time_step)
     segments_needed(task.length, scheme.segment_length, 0.0)  # refuses a cable of countless ones
-    count = division(task.cable, task.length, scheme.segment_length)
-    check_memory(path.times.size, count)
-    line, c, idle = (
-        new_line(count),
-        task.cable.numbers(task.bed, task.clamps, task.surface),
-        DrumProperties().numbers(),
-    )
+    check_memory(path.times.size, division(task.cable, task.length, scheme.segment_length))
+    c = task.cable.numbers(task.bed, task.clamps, task.surface)
     _refuse_clamp(task.clamps, True, "at the free tail")
     _refuse_below(task.bed, np.zeros((1, 3)))
-    J, tail_drag = task.current.at((0.0, 0.0, 0.0)), task.tail_drag
-    uphill = steady_direction(path.leaving, J, task.cable, tail_drag)
-    line.ends.layout.segment_length = task.length / count
-    lay_straight(line, task.length, uphill, path.leaving[0], idle, c)
-    line.ends.layout.free_end, line.ends.layout.tail_drag = True, tail_drag
+    J = task.current.at((0.0, 0.0, 0.0))
+    line = towed(task.cable, path.leaving, task.length, scheme.segment_length, J, task.tail_drag)
     line.ends.solver.tolerance = scheme.tolerance
-    set_steady_tow(line, path.leaving[0], J, task.cable, tail_drag, scheme.segment_length)
     path.place[:] += line.position[NOW, 0]
     # Places are counted from the tail: with this origin the tow point starts at (0, 0, 0), where J was taken.
     origin = line.ends.origin[:] = -line.position[NOW, 0]
-    trail_on_bed(line, task.bed)
-    trail_on_surface(line, task.surface)
-    run = _run(line, path, resting(path.times), task.current.numbers(origin), c, idle, scheme.rtol)
+    trail(line, task.bed, task.surface)
+    water = task.current.numbers(origin)
+    run = _run(line, path, resting(path.times), water, c, DrumNumbers(), scheme.rtol)
     return run if task.surface is None else replace(run, has_surface=True)
 
 

@@ -156,6 +156,14 @@ def _solve_softly(
     for j in range(1, line.ends.count + 1):
         # All segments start taut, with at least the tension that friction and weight can cause.
         line.tension[NEW, j] = max(line.tension[NEW, j], pull)
+    return solve_softened(line, w, c, drum, work)
+
+
+@inner
+def solve_softened(line: Line, w: Weights, c: CableNumbers, drum: DrumNumbers, work: Load) -> bool:
+    """Solve with a softened slack law, which is then sharpened in stages, each with the solution of the one before as
+    its first guess; iterations are added to those of the last attempt.
+    """
     spent = line.ends.solved.iterations
     line.ends.solver.smoothing = SOFTEST
     while True:
@@ -163,7 +171,6 @@ def _solve_softly(
         spent += line.ends.solved.iterations
         if not converged or line.ends.solver.smoothing <= SMOOTHING:
             break
-        # The solution for one smoothing is the first guess for the next, ten times as sharp.
         line.ends.solver.smoothing = max(0.1 * line.ends.solver.smoothing, SMOOTHING)
     line.ends.solver.smoothing = SMOOTHING
     line.ends.solved.iterations = spent

@@ -1,6 +1,6 @@
 """A cable that lies straight and slack in the water comes along without a bight: the lumped cable's start.
 
-Verifies: `cable.lumped.start.lay`. Exact: the length in the water is the distance between the ends. Tolerance: the
+Verifies: `cable.lumped.history.lay`. Exact: the length in the water is the distance between the ends. Tolerance: the
 stretch of an "inextensible" lumped cable, 1e-6 of its length. A start at a tension of 1e-11 N had a tenth of its
 length too much.
 """

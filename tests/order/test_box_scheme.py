@@ -10,15 +10,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from cable import CableProperties, Current, DrumProperties, Equation7
-from cable.feng_allen import run as feng_allen
-from cable.task import PullOut
+from cable import CableProperties, Current, DrumProperties, Equation7, pull_out
 
 
 def pull_out_boxes(tow_velocity, duration, step, *, segment_length=0.5, **others):
-    """Return the run with the states of its nodes, which the public face does not show."""
     scheme = Equation7(time_step=step, segment_length=segment_length)
-    return feng_allen.pull_out_boxes(PullOut(tow_velocity=tow_velocity, duration=duration, **others), scheme)
+    return pull_out(tow_velocity, duration, scheme=scheme, **others)
 
 
 DRAG = 0.5 * 1000.0 * np.pi * 0.0025 * 0.01
@@ -52,7 +49,7 @@ def slopes(errors):
 @pytest.mark.parametrize(("step", "segment_length"), [(0.5, 1.0), (0.1, 0.5), (0.33, 0.2)])
 def test_straight_pull_is_exact_at_every_step(step, segment_length):
     run = pull_out_boxes(lambda _: (1.0, 0.0, 0.0), 10.0, step, segment_length=segment_length)
-    assert run.converged
+    assert run.outcome.completed
     np.testing.assert_allclose(run.length, run.time, rtol=1e-12)
     np.testing.assert_allclose(run.tow_force[:, 0], -DRAG * run.time, atol=1e-12)
     np.testing.assert_allclose(run.tow_force[:, 1:], 0.0, atol=1e-14)
@@ -105,7 +102,7 @@ def test_the_cable_closes_between_drum_and_tow_point_to_second_order():
         run = pull_out_boxes(helix, 20.0, step, segment_length=segment_length)
         t = run.time
         tow = np.stack([np.sin(0.2 * t) / 0.2, (1.0 - np.cos(0.2 * t)) / 0.2, -0.2 * t], axis=1)
-        ends = np.array([x[0] for x in run.positions])
+        ends = np.array([x[0] for x in run.shapes])
         gaps.append(np.linalg.norm(ends - tow, axis=1).max())
     assert gaps[1] < 0.04  # of 20 m, wound with a radius of 5 m, in segments of 1 m
     assert gaps[0] / gaps[1] > 3.0
@@ -119,14 +116,14 @@ def test_a_stretching_cable_in_a_cross_current_pays_out_less_than_it_covers():
         cable=CableProperties(compliance=0.05),
         current=Current.uniform((0.0, 0.1, 0.0)),
     )
-    assert run.converged
+    assert run.outcome.completed
     assert run.tow_force[-1, 1] > 0.0  # the current sets east and pushes the cable, and the vehicle, east
     assert run.length[-1] < 20.0
 
 
 def test_a_cable_that_would_have_to_push_stops_the_run_and_says_so():
     run = pull_out_boxes(lambda t: (max(1.0 - 0.2 * t, 0.0), 0.0, 0.0), 8.0, 0.1)
-    assert not run.converged
-    assert "goes slack" in run.message
-    assert "cable.MovingEnd" in run.message
-    assert run.smallest_tension > -1e-6
+    assert not run.outcome.completed
+    assert "goes slack" in run.outcome.message
+    assert "cable.MovingEnd" in run.outcome.message
+    assert run.diagnostics()["smallest_tension_N"] > -1e-6

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cable import CableProperties, Current, DrumProperties, Paper
+from cable import CableProperties, Current, DrumProperties, Paper, pull_out
 from cable.feng_allen import run as feng_allen
 from cable.feng_allen.box_equations import Ends
 from cable.feng_allen.box_newton import box_workspace, start_paper
@@ -25,9 +25,8 @@ from cable.task import PullOut
 
 
 def pull_out_paper(tow_velocity, duration, step, *, reading="tangent", implicit=False, **others):
-    """Return the run with the states of its nodes, which the public face does not show."""
     scheme = Paper(time_step=step, reading=reading, implicit=implicit)
-    return feng_allen.pull_out_paper(PullOut(tow_velocity=tow_velocity, duration=duration, **others), scheme)
+    return pull_out(tow_velocity, duration, scheme=scheme, **others)
 
 
 DRAG = 0.5 * 1000.0 * np.pi * 0.0025 * 0.01
@@ -75,7 +74,7 @@ def test_straight_ahead_the_cable_pulls_back_and_does_nothing_else():
     assert (run.tow_force[1:, 0] < 0.0).all()
     np.testing.assert_allclose(run.tow_force[:, 0], -run.tow_tension, rtol=1e-14)
     np.testing.assert_allclose(run.tow_force[:, 1:], 0.0, atol=1e-14)
-    np.testing.assert_allclose(run.positions[-1][0], (30.0, 0.0, 0.0), atol=1e-12)
+    np.testing.assert_allclose(run.shapes[-1][0], (30.0, 0.0, 0.0), atol=1e-12)
 
 
 def test_in_the_dive_the_cable_pulls_back_and_up_in_the_hull_and_lifts_the_head():
@@ -92,7 +91,7 @@ def test_in_the_dive_the_cable_pulls_back_and_up_in_the_hull_and_lifts_the_head(
 @pytest.mark.parametrize(("step", "tension"), [(1.0, 0.989), (0.5, 0.983), (0.25, 0.980)])
 def test_implicit_dive_reproduces_the_prototype(step, tension):
     run = pull_out_paper(dive, 30.0, step, implicit=True)
-    assert run.message == "completed"
+    assert run.outcome.completed
     assert run.tow_tension[-1] == pytest.approx(tension, abs=5e-4)
 
 
@@ -146,18 +145,20 @@ def test_as_printed_the_wound_tangent_misplaces_the_drum_end_by_radians_or_stops
     """The reading ``drum``: ΔS/R_d is 10 rad at 1 s; the straight cable must stay straight, and does not."""
     for step in (2.0, 1.0, 0.5, 0.1):
         run = pull_out_paper(ahead, 20.0, step, reading="drum")
-        bend = max(np.abs(y[:, 5] - np.pi).max() for y in run.states)
-        assert bend > 0.9 or not run.converged
+        task = PullOut(tow_velocity=ahead, duration=20.0)
+        record, _ = feng_allen.run_paper(task, Paper(time_step=step, reading="drum"))
+        bend = max(np.abs(y[:, 5] - np.pi).max() for y in record.states)
+        assert bend > 0.9 or not run.outcome.completed
         assert np.isfinite(run.tow_force).all()
 
 
 def test_a_run_that_stops_says_when_where_and_what_to_try():
     run = pull_out_paper(ahead, 20.0, 0.1, reading="drum")
-    assert not run.converged
-    assert run.message.startswith("Stopped at 4.6 s: Newton's method stalled")
-    assert "node 45" in run.message
-    assert "Try reading='tangent'" in run.message
-    assert len(run.time) == len(run.states) == len(run.positions) == 46
+    assert not run.outcome.completed
+    assert run.outcome.message.startswith("Stopped at 4.6 s: Newton's method stalled")
+    assert "node 45" in run.outcome.message
+    assert "Try reading='tangent'" in run.outcome.message
+    assert len(run.time) == len(run.tensions) == len(run.shapes) == 46
 
 
 def test_a_step_taken_back_and_taken_again_gives_the_same_bits():
@@ -176,8 +177,8 @@ def test_a_step_taken_back_and_taken_again_gives_the_same_bits():
 
 def test_a_stopped_drum_adds_no_node_and_keeps_its_length():
     run = pull_out_paper(lambda t: (1.0 if t < 5.0 else 0.0, 0.0, 0.0), 10.0, 0.5, implicit=True)
-    assert run.converged
-    assert [len(y) for y in run.states[10:]] == [11] * 11
+    assert run.outcome.completed
+    assert [len(y) for y in run.tensions[10:]] == [11] * 11
     assert run.length[-1] == run.length[10]
     np.testing.assert_allclose(run.tow_tension[-5:], 0.0, atol=1e-12)  # the slack line rests
 
@@ -185,7 +186,7 @@ def test_a_stopped_drum_adds_no_node_and_keeps_its_length():
 def test_as_printed_a_stopped_cable_rings_about_zero_tension():
     run = pull_out_paper(lambda t: (1.0 if t < 5.0 else 0.0, 0.0, 0.0), 10.0, 0.5)
     np.testing.assert_allclose(run.tow_tension[-1] + run.tow_tension[-2], 0.0, atol=1e-9)
-    assert run.smallest_tension < -0.05
+    assert run.diagnostics()["smallest_tension_N"] < -0.05
 
 
 def test_a_start_from_rest_waits_for_the_first_motion_and_takes_its_direction():
@@ -200,9 +201,9 @@ def test_a_heavy_cable_hangs_down_behind_and_pulls_down():
     run = pull_out_paper(
         ahead, 20.0, 0.5, cable=heavy, drum=DrumProperties(friction_torque=0.02), implicit=True
     )
-    assert run.converged
+    assert run.outcome.completed
     assert run.tow_force[-1, 2] > 0.0
-    assert run.positions[-1][len(run.positions[-1]) // 2, 2] > 0.0
+    assert run.shapes[-1][len(run.shapes[-1]) // 2, 2] > 0.0
 
 
 @pytest.mark.parametrize("bad", [{"step": 0.0}, {"duration": np.nan}, {"reading": "sideways"}])
