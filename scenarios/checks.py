@@ -109,12 +109,10 @@ class Checks:
         if not isinstance(table, Mapping):
             self.say(name, "this is no mapping", "Allowed: key → number.", table)
             return
-        if _all_finite(table):
-            return
-        for key, inside in table.items():
-            for place, number in _leaves(f"{name}[{key!r}]", inside):
-                if real(number) is None:
-                    self.say(place, NO_NUMBER, "Allowed: a finite number.", number)
+        for keys, number in _leaves(table):
+            if real(number) is None:
+                place = name + "".join(f"[{key!r}]" for key in keys)
+                self.say(place, NO_NUMBER, "Allowed: a finite number.", number)
 
     def refuse(self) -> None:
         """Raise a `ScenarioError` if anything is wrong."""
@@ -168,21 +166,13 @@ class Checks:
         return np.ascontiguousarray(array)
 
 
-def _all_finite(table: Mapping[str, Any]) -> bool:
-    """Return whether all of a table, and of the tables in it, is a finite number."""
-    for inside in table.values():
-        if not (_all_finite(inside) if isinstance(inside, dict) else real(inside) is not None):
-            return False
-    return True
-
-
-def _leaves(place: str, inside: object) -> Iterator[tuple[str, object]]:
-    """Walk through tables in tables: every value with its place."""
+def _leaves(inside: object, keys: tuple[object, ...] = ()) -> Iterator[tuple[tuple[object, ...], object]]:
+    """Walk through tables in tables: every value with the keys that lead to it."""
     if isinstance(inside, Mapping):
         for key, value in inside.items():
-            yield from _leaves(f"{place}[{key!r}]", value)
+            yield from _leaves(value, (*keys, key))
     else:
-        yield place, inside
+        yield keys, inside
 
 
 def _inside(values: Any, quantity: Quantity) -> Any:

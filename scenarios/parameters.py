@@ -373,16 +373,7 @@ def _with_key(table: Mapping[str, Any], keys: list[str], value: float) -> dict[s
     return {**table, key: _with_key(table.get(key, {}), rest, value) if rest else value}
 
 
-def _with_run(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
-    return _fields(RUN_FIELDS, own)
-
-
-def _with_start(trial: Trial, own: Mapping[str, float]) -> dict[str, Any]:
-    changes: dict[str, Any] = _fields(START_FIELDS, own)
-    return {"start": replace(trial.start, **changes)}
-
-
-def _fields(fields: Mapping[str, Quantity], own: Mapping[str, float]) -> dict[str, float]:
+def _fields(fields: Mapping[str, Quantity], own: Mapping[str, float]) -> dict[str, Any]:
     """Return values by the names of the fields that hold them, in inner units."""
     return {name: own[row.name] * row.scale for name, row in fields.items() if row.name in own}
 
@@ -466,8 +457,8 @@ _CHANGES: dict[str, Callable[[Trial, Mapping[str, float]], dict[str, Any]]] = {
     **{section: _with_part(section) for section in PARTS},
     **{section: _with_lists(section) for section in _LISTS if section != "water"},
     "station": _with_station,
-    "run": _with_run,
-    "start": _with_start,
+    "run": lambda trial, own: _fields(RUN_FIELDS, own),
+    "start": lambda trial, own: {"start": replace(trial.start, **_fields(START_FIELDS, own))},
     "water": _with_water,
 }
 """Section → what a trial's fields are with other values in it."""

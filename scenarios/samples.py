@@ -225,15 +225,9 @@ def check_motion(samples: Samples) -> list[Problem]:
     """Return the inconsistencies of the columns of a motion, each valid by itself."""
     names = {name: quantity.name for name, quantity in by_field(MOTION).items()}
     given = [name for name, column in names.items() if column in samples.columns]
-    section = "" if samples.lines else "motion."
+    file, line, section = samples.file, samples.key_line, "" if samples.lines else "motion."
     return [
-        Problem(
-            file=samples.file,
-            line=samples.key_line,
-            key=f"{section}{names.get(name, name)}",
-            why=why,
-            remedy=remedy,
-        )
+        Problem(file=file, line=line, key=f"{section}{names.get(name, name)}", why=why, remedy=remedy)
         for name, why, remedy in motion_faults(given, samples.interpolation)
     ]
 
@@ -411,17 +405,11 @@ def _shape_problems(name: str, columns: list[str], rows: list[Row]) -> list[Prob
     """Return the rows that have more or fewer cells than the header, or that there are no rows."""
     if not rows:
         return [Problem(file=name, why="there are no rows below the header", remedy="Add one a sample.")]
-    count = len(columns)
+    why, remedy = f"the header has {len(columns)} columns", "Give every column one cell."
     return [
-        Problem(
-            file=name,
-            line=line,
-            found=f"{len(cells)} cells",
-            why=f"the header has {count} columns",
-            remedy="Give every column one cell.",
-        )
+        Problem(file=name, line=line, found=f"{len(cells)} cells", why=why, remedy=remedy)
         for line, cells in rows
-        if len(cells) != count
+        if len(cells) != len(columns)
     ]
 
 

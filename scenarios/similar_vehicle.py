@@ -293,16 +293,11 @@ def _given(source: Source, base: Mapping[str, Leaf], leaves: Mapping[str, Leaf])
             problems.append(source.problem(place, "this cannot be", rows[key].allowed, found=value))
     if problems:
         raise ScenarioError(problems)
-    said = {
-        place: {
-            "value": float(known[key]),
-            "unit": base[place]["unit"],
-            "source": f"measured: {key} of [known]",
-        }
-        for key, places in STANDS_FOR.items()
-        for place in places
-        if key in known
-    }
+    said: dict[str, Leaf] = {}
+    for key, places in STANDS_FOR.items():
+        for place in places if key in known else ():
+            unit, origin = base[place]["unit"], f"measured: {key} of [known]"
+            said[place] = {"value": float(known[key]), "unit": unit, "source": origin}
     speed, rps = (real(known.get(key)) for key in ("speed_m_s", "propeller_rps"))
     return Given(base=base, own=said | dict(leaves), speed=speed, rps=rps)
 

@@ -65,18 +65,17 @@ def only_default(asked: list[str]) -> str:
 RUN_FIELDS, START_FIELDS = by_field(RUN), by_field(START)
 """Fields of a trial that hold the numbers of [run], and those of a start, with their quantities."""
 
-FOUND_BY_TRIM = (
-    "pitch",
-    "sway_speed",
-    "heave_speed",
-    "roll_rate",
-    "pitch_rate",
-    "yaw_rate",
-    "propeller_speed",
-    "rudder_angle",
-    "stern_plane_port_angle",
-    "stern_plane_starboard_angle",
-)
+GIVEN_AT_TRIM = {
+    "heading",
+    "roll",
+    "depth",
+    "surge_speed",
+    "wet_length",
+    "drum_north",
+    "drum_east",
+    "drum_down",
+}
+FOUND_BY_TRIM = tuple(name for name in START_FIELDS if name not in GIVEN_AT_TRIM)
 """Fields of a start that may not be given with a start in trim."""
 FOUND_WHY = "a start with at_trim finds it"
 TRIM_NEEDS_SPEED = "a start with at_trim holds a forward speed: fins need a flow"
@@ -418,29 +417,18 @@ class Trial:
         """Return the kind of trial, its duration, its start, and the instructions of the vehicle."""
         start, cable = self.start, self.cable
         heading, speed = np.degrees(start.heading), start.surge_speed
+        diameter, mass = (1e3 * cable.get(name, 0.0) for name in ("diameter", "mass_per_length"))
+        lies = f"heading {heading:g}°, depth {start.depth:g} m, speed {speed:g} m/s"
+        flow = f"north {self.current[0]:g}, east {self.current[1]:g} m/s"
+        drum = self.winch.control.replace("_", " ") if self.winch else "free"
+        made = f"{diameter:g} mm, {mass:g} g/m, segments of {self.segment_length:g} m, scheme {self.scheme}"
         reported = self.commands if self.commands is not None else self.motion
         rows = [
             ("duration", f"{self.duration:g} s, hull in steps of {self.hull_step:g} s"),
-            (
-                "start",
-                f"heading {heading:g}°, depth {start.depth:g} m, speed {speed:g} m/s, "
-                f"{start.wet_length:g} m of cable out",
-            ),
-            (
-                "cable",
-                f"{1e3 * cable.get('diameter', 0.0):g} mm, {1e3 * cable.get('mass_per_length', 0.0):g} g/m, "
-                f"segments of {self.segment_length:g} m, scheme {self.scheme}",
-            ),
-            (
-                "current",
-                f"north {self.current[0]:g}, east {self.current[1]:g} m/s"
-                + (", with a profile" if self.profile else ""),
-            ),
-            (
-                "drum",
-                (self.winch.control.replace("_", " ") if self.winch else "free")
-                + (", on a vessel" if self.vessel else ""),
-            ),
+            ("start", f"{lies}, {start.wet_length:g} m of cable out"),
+            ("cable", made),
+            ("current", flow + (", with a profile" if self.profile else "")),
+            ("drum", drum + (", on a vessel" if self.vessel else "")),
         ]
         if reported is not None:
             kind = "commands" if reported is self.commands else "motion"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -23,91 +23,77 @@ class Table:
     """The keys of a table and their units, and the values of those that may be left out."""
 
     units: Mapping[str, str]
-    optional: Mapping[str, float] = field(default_factory=dict)
+    optional: Mapping[str, float]
 
 
-def _units(lines: str) -> dict[str, str]:
-    """Read lines ``unit ; keys`` into key → unit."""
+def _table(lines: str) -> Table:
+    """Read lines ``unit ; keys``, with ``=`` and a value behind a key that may be left out."""
     rows = [line.split(";") for line in lines.strip().splitlines()]
-    return {key: unit.strip() for unit, keys in rows for key in keys.split()}
+    cells = [(unit.strip(), *key.partition("=")) for unit, keys in rows for key in keys.split()]
+    units = {key: unit for unit, key, _, _ in cells}
+    return Table(units, {key: float(value) for _, key, _, value in cells if value})
 
 
 LISTS = {
-    "thrusters": Table(
-        _units("""
+    "thrusters": _table("""
 m    ; x y z
 1    ; direction_x direction_y direction_z
 N    ; thrust_ahead thrust_astern
-1    ; curve_exponent dead_band
-kg/s ; loss_per_inflow
-m    ; reaction_arm
-s    ; lag
-1    ; lost_command
+1    ; curve_exponent=2 dead_band=0
+kg/s ; loss_per_inflow=0
+m    ; reaction_arm=0
+s    ; lag=0.1
+1    ; lost_command=0
 """),
-        {"curve_exponent": 2.0, "dead_band": 0.0, "loss_per_inflow": 0.0, "reaction_arm": 0.0}
-        | {"lag": 0.1, "lost_command": 0.0},
-    ),
-    "fins": Table(
-        _units("""
+    "fins": _table("""
 m2    ; area
 1/rad ; lift_slope
 1     ; aspect_ratio span_efficiency profile_drag_coefficient normal_force_coefficient
 rad   ; stall_angle
 m     ; x y z
 rad   ; span_angle
-1     ; rudder_share plane_share roll_share
-s     ; lag
+1     ; rudder_share=0 plane_share=0 roll_share=0
+s     ; lag=0.1
 rad/s ; rate_limit
-rad   ; offset deflection_limit
-1     ; lost_command
+rad   ; offset=0 deflection_limit
+1     ; lost_command=0
 """),
-        {"rudder_share": 0.0, "plane_share": 0.0, "roll_share": 0.0}
-        | {"lag": 0.1, "offset": 0.0, "lost_command": 0.0},
-    ),
-    "moving_masses": Table(
-        _units("""
+    "moving_masses": _table("""
 kg    ; mass
 m     ; x y z travel_aft travel_forward
 m/s   ; slide_rate
-rad   ; turn_limit
-rad/s ; turn_rate
-s     ; lag
-1     ; lost_command
+rad   ; turn_limit=0
+rad/s ; turn_rate=1
+s     ; lag=0.1
+1     ; lost_command=0
 """),
-        {"turn_limit": 0.0, "turn_rate": 1.0, "lag": 0.1, "lost_command": 0.0},
-    ),
-    "buoyancy_engines": Table(
-        _units("""
+    "buoyancy_engines": _table("""
 m    ; x y z
 m3   ; least_volume most_volume
 m3/s ; pump_rate
-s    ; lag
-1    ; lost_command
+s    ; lag=0.1
+1    ; lost_command=0
 """),
-        {"lag": 0.1, "lost_command": 0.0},
-    ),
 }
 """Lists of actuators: the section, and the table of each."""
 
-FLOW_AXES = _units("""
+FLOW_AXES = _table("""
 kg/m ; drag drag_per_incidence_squared side_force_per_sideslip lift lift_per_incidence
 kg   ; roll_per_sideslip pitch pitch_per_incidence yaw_per_sideslip
 kg s ; roll_per_roll_rate pitch_per_pitch_rate yaw_per_yaw_rate
-""")
+""").units
 """Coefficients of forces in flow axes, [flow_axes]: all or none."""
 
 SECTIONS = {
-    "sections": Table(
-        _units("""
+    "sections": _table("""
 m ; x breadth height
 1 ; lateral_drag_coefficient vertical_drag_coefficient
-""")
-    )
+"""),
 }
 """Sections of a hull that is no body of revolution, [sections.name]: the table of each."""
 FURTHER = {
-    "products_of_inertia": _units("kg m2 ; xy xz yz"),
-    "race": _units("m ; advance\n1 ; thrust_loading"),
+    "products_of_inertia": _table("kg m2 ; xy xz yz").units,
+    "race": _table("m ; advance\n1 ; thrust_loading").units,
 }
 """Further sections: all of their numbers or none."""
 
