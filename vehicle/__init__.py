@@ -13,7 +13,7 @@ symbol         name                                  unit        equation       
 ν              u, v, w, p, q, r over ground          m/s, rad/s  M ν' = Σ terms                dynamics
 ν_r            the same through the water            m/s, rad/s  ν − (R_nbᵀ v_c, 0)            terms
 M_RB, r_G      mass matrix, centre of gravity        kg, m       Fossen 3.47                   rigid_body
-M_A, A_ij      added mass                            kg, kg m2   Lamb, strips                  added_mass
+M_A, A_ij      added mass                            kg, kg m2   Lamb, strips                  rigid_body
 C(ν)           Coriolis matrix of a mass matrix                  Kirchhoff                     rigid_body
 W, B, r_B      weight, buoyancy and its centre       N, m        (r_G W − r_B B) × k           restoring
 Y_uv, N_ur …   lift of the hull per surge speed      kg/m …      Y_uv |u| v + …                body_lift
@@ -26,12 +26,13 @@ C_L, C_D, α_s  lift, drag and stall of a fin         1, rad      attached, stal
 T, d           thrust and direction of a thruster    N, 1        T_max c^e                     thrusters
 V              volume of a buoyancy engine           m3          ρ g V                         buoyancy_engine
 r, ΔM          a moving mass, change of mass matrix  m           (M + ΔM) ν' = …               moving_mass
-K_D, K_α, …    drag and lift of a glider, per V²     kg/m        flow axes                     flow_axes
+K_D, K_α, …    drag and lift of a glider, per V²     kg/m        flow axes                     body_lift
 δ_r, δ_s       rudder, stern-plane angle             rad         lag, limits, backlash         actuators
 V, I, q_e      voltage, current, charge drawn        V, A, C     V_full − k q_e − R I          motor
 """
 
 from vehicle.actuators import Servo
+from vehicle.body_lift import FlowAxes
 from vehicle.buoyancy_engine import BuoyancyEngine
 from vehicle.channels import Channel
 from vehicle.dynamics import (
@@ -49,7 +50,6 @@ from vehicle.dynamics import (
     relative_velocity,
 )
 from vehicle.fin_list import Fin
-from vehicle.flow_axes import FlowAxes
 from vehicle.free_run import FreeRun, free_run
 from vehicle.kinematics import euler_angles, initial_state, normalise, quaternion_from_euler, rotation
 from vehicle.moving_mass import MovingMass

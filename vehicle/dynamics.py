@@ -215,15 +215,8 @@ def power(
     numbers: VehicleNumbers,
     out: np.ndarray,
 ) -> None:
-    """Fill out (len(POWERS),) with the powers on the hull relative to the water [W].
-
-    Args:
-        state: as for `derivative`.
-        command: as for `derivative`.
-        current_n: as for `derivative`.
-        wrench_b: as for `derivative`.
-        numbers: as for `derivative`.
-        out: the powers; losses are negative, whatever the motion.
+    """Fill out (len(POWERS),) with the powers on the hull relative to the water [W]; losses are negative, whatever the
+    motion. Arguments: `derivative`.
     """
     nu_r, terms = scratch(1, 6)[0], scratch(TERM_COUNT, 6)
     evaluate(state, command, current_n, wrench_b, numbers, scratch(3, 3), nu_r, terms)

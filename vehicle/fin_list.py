@@ -94,19 +94,6 @@ def listed_angle(state: np.ndarray, angles: tuple[float, float, float], fin: Lis
 
 
 @compiled
-def listed_angles(
-    state: np.ndarray,
-    angles: tuple[float, float, float],
-    fins: tuple[ListedFinNumbers, ...],
-    count: int,
-    out: np.ndarray,
-) -> None:
-    """Fill out (MOST_FINS,) with the angles of all listed fins in the water [rad]. Arguments: `add_fins`."""
-    for i in range(count):
-        out[i] = listed_angle(state, angles, fins[i])
-
-
-@compiled
 def add_fins(
     state: np.ndarray,
     nu_r: np.ndarray,

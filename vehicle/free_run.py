@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from subzero.jit import allocating, compiled
+from subzero.jit import allocating
 from vehicle.dynamics import POWERS, derivative_and_power, finish_step
 from vehicle.state import STATE_SIZE
 from vehicle.vehicle import Vehicle, VehicleNumbers
@@ -31,33 +31,6 @@ class FreeRun(NamedTuple):
     work: np.ndarray
 
 
-@compiled
-def rk4_step(
-    y: np.ndarray,
-    step: float,
-    command: np.ndarray,
-    current_n: np.ndarray,
-    wrench_b: np.ndarray,
-    numbers: VehicleNumbers,
-    k: np.ndarray,
-    stage: np.ndarray,
-    out: np.ndarray,
-) -> None:
-    """Fill out with y, the state and behind it the works, one step later [s]; k (4, entries of y) and stage are
-    scratch.
-    """
-    size, n = y.size, y.size - WORKS
-    derivative_and_power(y[:n], command, current_n, wrench_b, numbers, k[0, :n], k[0, n:])
-    for i in range(1, 4):
-        part = step if i == 3 else 0.5 * step
-        for j in range(size):
-            stage[j] = y[j] + part * k[i - 1, j]
-        derivative_and_power(stage[:n], command, current_n, wrench_b, numbers, k[i, :n], k[i, n:])
-    for j in range(size):
-        out[j] = y[j] + step / 6.0 * (k[0, j] + 2.0 * k[1, j] + 2.0 * k[2, j] + k[3, j])
-    finish_step(out[:n], command, numbers)
-
-
 @allocating
 def march(
     commands: np.ndarray,
@@ -67,10 +40,22 @@ def march(
     numbers: VehicleNumbers,
     history: np.ndarray,
 ) -> None:
-    """Fill history (n + 1, entries of y) from its first row on, one command of commands (n, 4 …) a step."""
-    k, stage = np.empty((4, history.shape[1])), np.empty(history.shape[1])
-    for i in range(commands.shape[0]):
-        rk4_step(history[i], step, commands[i], current_n, wrench_b, numbers, k, stage, history[i + 1])
+    """Fill history (n + 1, entries of the state and behind them the works) from its first row on, one command of
+    commands (n, 4 …) a step [s].
+    """
+    size, n = history.shape[1], history.shape[1] - WORKS
+    k, stage = np.empty((4, size)), np.empty(size)
+    for row in range(commands.shape[0]):
+        y, out, command = history[row], history[row + 1], commands[row]
+        derivative_and_power(y[:n], command, current_n, wrench_b, numbers, k[0, :n], k[0, n:])
+        for i in range(1, 4):
+            part = step if i == 3 else 0.5 * step
+            for j in range(size):
+                stage[j] = y[j] + part * k[i - 1, j]
+            derivative_and_power(stage[:n], command, current_n, wrench_b, numbers, k[i, :n], k[i, n:])
+        for j in range(size):
+            out[j] = y[j] + step / 6.0 * (k[0, j] + 2.0 * k[1, j] + 2.0 * k[2, j] + k[3, j])
+        finish_step(out[:n], command, numbers)
 
 
 def free_run(

@@ -12,12 +12,12 @@ from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 
 from subzero.errors import short
+from vehicle.body_lift import FlowAxes
 from vehicle.buoyancy_engine import MOST_ENGINES, NO_ENGINE, BuoyancyEngine
 from vehicle.channels import MOST_CHANNELS, Channel, table_of
 from vehicle.cross_flow import HullSection, section_problems
 from vehicle.derivatives import derivatives_of, is_table
 from vehicle.fin_list import MOST_FINS, NO_FIN, Fin
-from vehicle.flow_axes import FlowAxes
 from vehicle.moving_mass import MOST_MASSES, NO_MASS, MovingMass
 from vehicle.parameters import Problem, VehicleError, read_section
 from vehicle.products import Race, product_problems
@@ -121,16 +121,11 @@ def list_problems(vehicle: Vehicle) -> list[Problem]:
             found = f"{len(rows)} {section.replace('_', ' ')}"
             why = "that is more than the compiled equations hold"
             problems.append(Problem(key=section, found=found, why=why, allowed=f"up to {most}"))
-    problems += [
-        Problem(
-            key=f"thrusters.{name}.direction_x",
-            found="a direction of length 0",
-            why="it pushes nowhere",
-            allowed="a vector of the body's axes; its length does not matter",
-        )
-        for name, thruster in vehicle.thrusters
-        if not thruster.direction.any()
-    ]
+    for name, thruster in vehicle.thrusters:
+        if not thruster.direction.any():
+            key, found = f"thrusters.{name}.direction_x", "a direction of length 0"
+            why, allowed = "it pushes nowhere", "a vector of the body's axes; its length does not matter"
+            problems.append(Problem(key=key, found=found, why=why, allowed=allowed))
     return problems + _channel_problems([channel.name for channel in vehicle.channels])
 
 

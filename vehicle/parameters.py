@@ -148,18 +148,13 @@ def read_section(kind: type, section: str, values: object, problems: list[Proble
     before = len(problems)
     for name in values:
         if name not in fields:
-            allowed = nearest(name, list(fields))
-            problems.append(
-                Problem(key=f"{section}.{name}", found="this key", why="no such parameter", allowed=allowed)
-            )
+            key, allowed = f"{section}.{name}", nearest(name, list(fields))
+            problems.append(Problem(key=key, found="this key", why="no such parameter", allowed=allowed))
     for name, field in fields.items():
-        problem = (
-            check_value(f"{section}.{name}", values[name], field)
-            if name in values
-            else Problem(
-                key=f"{section}.{name}", found="nothing", why="it is missing", allowed=allowed_values(field)
-            )
-        )
+        key, allowed = f"{section}.{name}", allowed_values(field)
+        problem: Problem | None = Problem(key=key, found="nothing", why="it is missing", allowed=allowed)
+        if name in values:
+            problem = check_value(key, values[name], field)
         if problem:
             problems.append(problem)
     if len(problems) > before:

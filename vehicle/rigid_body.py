@@ -1,4 +1,5 @@
-"""The dry hull as a rigid body: mass, centre of gravity, inertia; and the Coriolis forces of any mass matrix.
+"""The dry hull as a rigid body: mass, centre of gravity, inertia; the Coriolis forces of any mass matrix; and the
+water that has to be moved along: added mass, and a correction of its Munk moment.
 
     M_RB = [ m I          −m S(r_G)
              m S(r_G)   I_G − m S(r_G)² ]                              (Fossen 2021, eq. 3.47)
@@ -15,6 +16,17 @@ P = M₁₁ v + M₁₂ ω  and  L = M₂₁ v + M₂₂ ω,
 which is skew in ν for every M, so νᵀ C(ν) ν = 0: these forces move energy about and never make any. Used with
 the rigid-body matrix it gives centripetal forces, with the added mass it gives the Munk moment and its
 companions.
+
+A body of revolution with a cruciform tail has the matrix M_A with A11 … A66 on the diagonal and the couplings
+A26 = ∫ x a(x) dx and A35 = −∫ x a(x) dx of its lateral strips. Used in `coriolis` it gives the full C_A(ν),
+with
+
+    N = −(A22 − A11) u v,   M = (A33 − A11) u w,   K = −(A33 − A22) v w      (Munk 1924)
+
+which turns a slender hull across the stream. Real boundary layers weaken it: viscous lift (`body_lift`)
+carries that. `munk_factor` scales the moment as it stands, for a diagnosis; at 1 the correction is exactly
+zero. A factor other than 1 is an empirical moment, no longer free of work, and is booked with the hull's
+losses.
 """
 
 from __future__ import annotations
@@ -24,7 +36,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from subzero.errors import short
-from subzero.jit import gated_inlined
+from subzero.jit import gated_inlined, inlined
 from vehicle.parameters import Problem, Section, parameter
 
 
@@ -79,6 +91,28 @@ class ProductsOfInertia(Section):
         return matrix
 
 
+@dataclass(frozen=True, kw_only=True)
+class AddedMass(Section):
+    """Added masses A_ij = −(SNAME acceleration derivatives) about the hull centre."""
+
+    surge: float = parameter("axial added mass, A11 = -X_udot", "kg", low=0.0)
+    sway: float = parameter("lateral added mass, A22 = -Y_vdot", "kg", low=0.0)
+    heave: float = parameter("vertical added mass, A33 = -Z_wdot", "kg", low=0.0)
+    roll: float = parameter("added roll inertia, A44 = -K_pdot", "kg m2", low=0.0)
+    pitch: float = parameter("added pitch inertia, A55 = -M_qdot", "kg m2", low=0.0)
+    yaw: float = parameter("added yaw inertia, A66 = -N_rdot", "kg m2", low=0.0)
+    sway_yaw: float = parameter("sway-yaw coupling, A26 = -Y_rdot = -N_vdot", "kg m")
+    heave_pitch: float = parameter("heave-pitch coupling, A35 = -Z_qdot = -M_wdot", "kg m")
+    munk_factor: float = parameter("factor on the Munk moment, 1 as computed", "1", low=0.0, high=10.0)
+
+    def matrix(self) -> np.ndarray:
+        """Return M_A about the hull centre, (6, 6) [kg, kg m, kg m2]."""
+        matrix = np.diag([self.surge, self.sway, self.heave, self.roll, self.pitch, self.yaw])
+        matrix[1, 5] = matrix[5, 1] = self.sway_yaw
+        matrix[2, 4] = matrix[4, 2] = self.heave_pitch
+        return matrix
+
+
 def inertia_problems(body: RigidBody, products: ProductsOfInertia | None) -> list[Problem]:
     """Return the problem of products of inertia that no body of these inertias has."""
     if products is None:
@@ -114,3 +148,16 @@ def coriolis(mass_matrix: np.ndarray, nu: np.ndarray, out: np.ndarray) -> None:
     out[3] = w * P1 - v * P2 + r * L1 - q * L2
     out[4] = u * P2 - w * P0 + p * L2 - r * L0
     out[5] = v * P0 - u * P1 + q * L0 - p * L1
+
+
+@inlined
+def munk_correction(nu_r: np.ndarray, added_mass: np.ndarray, excess: float, out: np.ndarray) -> None:
+    """Fill out (6,) with (munk_factor − 1) times the Munk moment [N, N m]; `excess` is munk_factor − 1."""
+    u, v, w = nu_r[0], nu_r[1], nu_r[2]
+    A11, A22, A33 = added_mass[0, 0], added_mass[1, 1], added_mass[2, 2]
+    # The signs of `coriolis`: drifting to starboard, v > 0, turns the nose to port while A22 > A11, further across the
+    # flow. Fins and lift of the hull have to outweigh that.
+    out[0] = out[1] = out[2] = 0.0
+    out[3] = -excess * (A33 - A22) * v * w
+    out[4] = excess * (A33 - A11) * u * w
+    out[5] = -excess * (A22 - A11) * u * v

@@ -19,20 +19,18 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from subzero.jit import inlined, scratch
-from vehicle.added_mass import munk_correction
-from vehicle.body_lift import body_lift
+from vehicle.body_lift import add_flow_axes, body_lift
 from vehicle.buoyancy_engine import add_engines
 from vehicle.cross_flow import add_section_drag, cross_flow_drag
 from vehicle.damping import axial_drag, linear_damping, quadratic_damping
 from vehicle.derivatives import add_damping
-from vehicle.fin_list import MOST_FINS, add_fins, listed_angles
+from vehicle.fin_list import MOST_FINS, add_fins, listed_angle
 from vehicle.fins import rudder, stern_plane
-from vehicle.flow_axes import add_flow_axes
 from vehicle.moving_mass import add_moving_masses
 from vehicle.products import add_products
 from vehicle.propeller import propeller
 from vehicle.restoring import restoring
-from vehicle.rigid_body import coriolis
+from vehicle.rigid_body import coriolis, munk_correction
 from vehicle.thrusters import add_thrusters
 
 if TYPE_CHECKING:
@@ -137,7 +135,8 @@ def fill_terms(
     stern_plane(nu_r, angles[2], 1.0, numbers.stern_planes, out[13])
     if numbers.product_count > 0:
         own = scratch(1, MOST_FINS)[0]
-        listed_angles(state, angles, numbers.fins, numbers.fin_count, own)
+        for i in range(numbers.fin_count):
+            own[i] = listed_angle(state, angles, numbers.fins[i])
         add_products(nu_r, n, angles, own, numbers, out)
     for i in range(6):
         out[14, i] = wrench_b[i]

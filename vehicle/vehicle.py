@@ -17,8 +17,7 @@ import numpy as np
 from subzero.errors import short
 from subzero.jit import Record
 from vehicle.actuators import Servo, Servos
-from vehicle.added_mass import AddedMass
-from vehicle.body_lift import BodyLift
+from vehicle.body_lift import NO_FLOW_AXES, BodyLift, FlowAxes
 from vehicle.buoyancy_engine import BuoyancyEngine, EngineNumbers
 from vehicle.channels import Channel
 from vehicle.cross_flow import CrossFlowDrag, HullSection, strips_of
@@ -26,7 +25,6 @@ from vehicle.damping import AxialDrag, LinearDamping, QuadraticDamping
 from vehicle.derivatives import NO_DERIVATIVES, Derivatives
 from vehicle.fin_list import Fin, ListedFinNumbers
 from vehicle.fins import FinNumbers, Fins
-from vehicle.flow_axes import NO_FLOW_AXES, FlowAxes
 from vehicle.geometry import Hull, TowPoint
 from vehicle.lists import (
     DERIVATIVES,
@@ -48,7 +46,7 @@ from vehicle.products import NO_RACE, Race, RaceNumbers, count_of
 from vehicle.products import table_of as product_table_of
 from vehicle.propeller import Propeller, PropellerNumbers
 from vehicle.restoring import Buoyancy, RestoringNumbers
-from vehicle.rigid_body import ProductsOfInertia, RigidBody
+from vehicle.rigid_body import AddedMass, ProductsOfInertia, RigidBody
 from vehicle.state import STATE_SIZE
 from vehicle.thrusters import Thruster, table_of
 
@@ -320,24 +318,18 @@ def from_mapping(mapping: Mapping[str, object]) -> Vehicle:
         VehicleError: with every problem found: unknown or missing keys, text for a number, values outside the
             hard limits, a hull whose parts do not fit, an added mass that is no mass.
     """
-    problems = [
-        Problem(
-            key=str(name),
-            found="this table",
-            why="no such section",
-            allowed=nearest(name, [*SECTIONS, *OPTIONAL]),
-        )
-        for name in mapping
-        if name not in {*SECTIONS, *OPTIONAL}
-    ]
+    known, problems = [*SECTIONS, *OPTIONAL], []
+    for name in mapping:
+        if name not in known:
+            key, allowed = str(name), nearest(name, known)
+            problems.append(Problem(key=key, found="this table", why="no such section", allowed=allowed))
     sections: dict[str, Any] = read_optional(mapping, problems)
     for name, kind in SECTIONS.items():
         if name in mapping:
             sections[name] = read_section(kind, name, mapping[name], problems)
         else:
-            problems.append(
-                Problem(key=name, found="nothing", why="this table is missing", allowed=f"a table [{name}]")
-            )
+            why, allowed = "this table is missing", f"a table [{name}]"
+            problems.append(Problem(key=name, found="nothing", why=why, allowed=allowed))
     if problems:
         raise VehicleError(tuple(problems))
     return Vehicle(**sections)

@@ -29,9 +29,9 @@ from vehicle import (
     potential_energy,
     to_mapping,
 )
+from vehicle.body_lift import FlowAxes
 from vehicle.buoyancy_engine import BuoyancyEngine
 from vehicle.fin_list import Fin
-from vehicle.flow_axes import FlowAxes
 from vehicle.lists import LISTS
 from vehicle.moving_mass import MovingMass
 
