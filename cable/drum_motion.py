@@ -40,15 +40,8 @@ def lead_drum(table: np.ndarray, time: float, drum: DrumNumbers) -> None:
             high = middle
     whole = table[high, 0] - table[low, 0]
     x = min(max((time - table[low, 0]) / whole, 0.0), 1.0)
-    hermite(
-        table[low, PLACE:],
-        table[high, PLACE:],
-        table[low, VELOCITY:],
-        table[high, VELOCITY:],
-        whole,
-        x,
-        drum.place,
-    )
+    near, far = table[low], table[high]
+    hermite(near[PLACE:], far[PLACE:], near[VELOCITY:], far[VELOCITY:], whole, x, drum.place)
     for i in range(3):
         before, after = table[low, VELOCITY + i], table[high, VELOCITY + i]
         drum.velocity[i] = before + x * (after - before)

@@ -209,8 +209,9 @@ class History:
         first, last = self.time[0], self.time[-1]
         time = real(t)
         if time is None or not first - 1e-9 <= time <= last + 1e-9:
-            message = f"There is no shape at t = {short(t)} s: the run covers {first:g} to {last:g} s."
-            raise BadValueError(message)
+            raise BadValueError(
+                f"There is no shape at t = {short(t)} s: the run covers {first:g} to {last:g} s."
+            )
         return int(np.abs(self.time - t).argmin())
 
 

@@ -124,12 +124,11 @@ def hold(
             found = replace(found, clamps=clamps, surface=surface)
             _check_bends(found)
             return found
-    message = (
+    raise HoldError(
         f"No equilibrium was found of {length:g} m of cable between ends {np.linalg.norm(places[0] - places[1]):g} m "
         "apart: forces and lengths would not balance. Try other segments (segment_length), a little compliance or "
         "bending stiffness, or begin from a shape that is near (start)."
     )
-    raise HoldError(message)
 
 
 def _search(
@@ -266,21 +265,21 @@ def _check_bends(found: Equilibrium) -> None:
     d /= np.maximum(np.linalg.norm(d, axis=1), 1e-30)[:, None]
     sharpest = float((d[1:] * d[:-1]).sum(axis=1).min())
     if found.cable.bending_stiffness > 0.0 and sharpest < SHARPEST:
-        message = (
+        raise HoldError(
             f"hold: the cable, with a bending stiffness of {found.cable.bending_stiffness:g} N m², was only found "
             f"folded, by {np.degrees(np.arccos(max(sharpest, -1.0))):.0f} degrees from one segment to the next. It "
             "would have to push, which is not modelled, or its segments are too long: take shorter ones, move its "
             "ends apart, or take less stiffness."
         )
-        raise HoldError(message)
 
 
 def _checked_ends(ends: Sequence[Place] | np.ndarray) -> np.ndarray:
     """Return the ends as finite numbers (2, 3)."""
     places = numbers_in(ends)
     if places is None or places.shape != (2, 3) or not np.isfinite(places).all():
-        message = f"hold: ends must be two places of three finite numbers (north, east, down in m); got {short(ends)}."
-        raise HoldError(message)
+        raise HoldError(
+            f"hold: ends must be two places of three finite numbers (north, east, down in m); got {short(ends)}."
+        )
     return places
 
 
@@ -288,8 +287,7 @@ def _positive(name: str, given: object) -> float:
     """Return a length as a float [m]; raise an error if it is not a positive number."""
     length = real(given)
     if length is None or length <= 0.0:
-        message = f"hold: {name} is {short(given)}; it must be a positive number of metres."
-        raise HoldError(message)
+        raise HoldError(f"hold: {name} is {short(given)}; it must be a positive number of metres.")
     return length
 
 
@@ -298,18 +296,16 @@ def _checked_length(places: np.ndarray, given: float, cable: AnyCable) -> float:
     length = _positive("length", given)
     apart = float(np.linalg.norm(places[0] - places[1]))
     if cable.compliance == 0.0 and apart >= TAUT * length:
-        message = (
+        raise HoldError(
             f"hold: the ends are {apart:.10g} m apart and the cable, which does not stretch, is {length:.10g} m long. "
             "Give more length, or a compliance (1/EA)."
         )
-        raise HoldError(message)
     if apart > (1.0 + MOST_STRAIN) * length:
-        message = (
+        raise HoldError(
             f"hold: the ends are {apart:.10g} m apart and the cable is {length:.10g} m long: it would stretch by "
             f"{100.0 * (apart / length - 1.0):.0f} %, and at most {100.0 * MOST_STRAIN:g} % is taken for a cable. Give "
             "more length."
         )
-        raise HoldError(message)
     return length
 
 
@@ -319,11 +315,10 @@ def _segments(length: float, given: float | None) -> int:
         return SEGMENTS
     segment_length = _positive("segment_length", given)
     if length / segment_length > MOST_SEGMENTS:
-        message = (
+        raise HoldError(
             f"hold: {length:g} m in segments of {segment_length:g} m are more than {MOST_SEGMENTS} segments. Take "
             "longer ones."
         )
-        raise HoldError(message)
     return max(2, int(np.ceil(length / segment_length - 1e-9)))
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from functools import cache
-from math import isfinite, sqrt
+from math import acos, isfinite, pi, sqrt
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -166,11 +166,10 @@ class CableProperties:
             value = checked(type(self).__name__, each.name, getattr(self, each.name), least=0.0, above=above)
             object.__setattr__(self, each.name, value)
         if self.internal_damping > 0.0 and self.compliance == 0.0:
-            message = (
+            raise BadValueError(
                 f"CableProperties: internal_damping is {self.internal_damping:g} N s, with compliance = 0: what does "
                 "not stretch damps nothing. Give the cable its compliance, 1/(E A), or leave internal_damping at 0."
             )
-            raise BadValueError(message)
 
     @property
     def virtual_mass_per_length(self) -> float:
@@ -192,7 +191,6 @@ class CableProperties:
     @property
     def tangential_drag(self) -> float:
         """½ρπdC_t, the drag per metre at 1 m/s along the cable: 0.03927 for Table 1. [N s²/m³]."""
-        pi = 3.141592653589793
         return 0.5 * self.water_density * pi * self.diameter * self.tangential_drag_coefficient
 
     @property
@@ -202,8 +200,6 @@ class CableProperties:
 
     def critical_angle(self, speed: float) -> float:
         """Angle to the flow φ of a long heavy cable towed at a steady speed: ½ρdC_nU² sin²φ = w_c cosφ. [rad]."""
-        from math import acos
-
         ratio = abs(self.weight_in_water) / (2.0 * self.normal_drag * speed * speed)
         return acos(sqrt(1.0 + ratio * ratio) - ratio)
 
@@ -231,14 +227,8 @@ class CableProperties:
         elif self.bending_stiffness > 0.0:
             special[StiffCableNumbers] = {"bending_stiffness": self.bending_stiffness}
         if surface is not None:
-            parts = (
-                self.mass_per_length,
-                values["added_mass"],
-                along,
-                self.tangential_drag,
-                self.normal_drag,
-            )
-            whole = np.array([*parts, self.buoyancy, self.diameter])
+            parts = (self.mass_per_length, values["added_mass"], along, self.tangential_drag)
+            whole = np.array([*parts, self.normal_drag, self.buoyancy, self.diameter])
             level = checked("", "surface", surface, unit="m, its depth")
             floating = {"surface_level": level, "whole": whole, "softness": 1.0, "mass_along": along}
             special[FloatingCableNumbers] = floating

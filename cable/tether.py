@@ -186,7 +186,8 @@ class Tether:
             inf if longest is None else checked("Tether", "longest", longest, least=start, unit="m")
         )
         each = _segment_length(start, segments, segment_length)
-        drum, c = self._winch.numbers(), self.cable.numbers(bed, clamps, surface)
+        around: dict[str, Any] = {"bed": bed, "clamps": clamps, "surface": surface}
+        drum, c = self._winch.numbers(), self.cable.numbers(**around)
         if clamps is not None and clamps.second is not None and not (two and isinstance(self._winch, Brake)):
             raise BadValueError(
                 "Tether: the second end is clamped; only what a cable.Brake holds can be. Leave Clamps.second out."
@@ -206,16 +207,7 @@ class Tether:
         else:
             rate = _rate_at_start(self._winch)
             passing = _passing(self.current, states, rate)
-            rest = hold(
-                states[:, 0],
-                start,
-                passing,
-                cable=self.cable,
-                segment_length=each,
-                bed=bed,
-                clamps=clamps,
-                surface=surface,
-            )
+            rest = hold(states[:, 0], start, passing, cable=self.cable, segment_length=each, **around)
             line, origin = _from_rest(rest, states, drum, rate), states[1, 0]
         line.ends.origin[:] = origin
         line.ends.solver.tolerance = checked("Tether", "tolerance", tolerance, least=FINEST, most=COARSEST)
@@ -344,11 +336,8 @@ class Tether:
         """
         self._forget_attempt()
         before = self.save()
-        here, size, rate = (
-            self._places(),
-            MOVED * self.length,
-            _weight(dt, float(self._line.ends.previous_step)),
-        )
+        rate = _weight(dt, float(self._line.ends.previous_step))
+        here, size = self._places(), MOVED * self.length
         here[:, 0] += dt * here[:, 1]
         answer = np.empty((3 * self._ends, 3 * self._ends))
         try:

@@ -152,15 +152,11 @@ class Waves:
         """Return the velocity of the water north, east, down (3,) at a place [m] and time [s]. [m/s]"""
         theta, k, d = self.angle(north, east, time), wave_number(self.frequency, self.depth), max(down, 0.0)
         # cosh and sinh of k(h−d) over sinh kh, without numbers that overflow
-        near, far = (
-            np.exp(-k * d),
-            0.0 if self.depth == np.inf else np.exp(k * (min(d, self.depth) - 2.0 * self.depth)),
-        )
-        size = (
-            self.amplitude
-            * self.frequency
-            / (1.0 if self.depth == np.inf else 1.0 - np.exp(-2.0 * k * self.depth))
-        )
+        near, far, left = np.exp(-k * d), np.zeros(1), np.ones(1)
+        if self.depth != np.inf:
+            far = np.exp(k * (min(d, self.depth) - 2.0 * self.depth))
+            left = 1.0 - np.exp(-2.0 * k * self.depth)
+        size = self.amplitude * self.frequency / left
         u, w = float(size * (near + far) @ np.cos(theta)), float(size * (near - far) @ np.sin(theta))
         return u * float(np.cos(self.direction)), u * float(np.sin(self.direction)), -w
 
@@ -314,10 +310,8 @@ class VesselResponse:
             turning = np.exp(1j * waves.angle(at[0], at[1], t))
             moved, rate = (answer @ turning).real, (answer @ (1j * met * turning)).real
             u = min(t / ramp, 1.0) if ramp > 0.0 else 1.0
-            share, growth = (
-                u**3 * (10.0 - 15.0 * u + 6.0 * u * u),
-                30.0 * (u * (1.0 - u)) ** 2 / max(ramp, 1e-30),
-            )
+            share = u**3 * (10.0 - 15.0 * u + 6.0 * u * u)
+            growth = 30.0 * (u * (1.0 - u)) ** 2 / max(ramp, 1e-30)
             return np.array([start + t * speed + share * moved, speed + share * rate + growth * moved])
 
         return Motion(state)

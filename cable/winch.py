@@ -94,10 +94,9 @@ class ConstantTension:
         """
         wanted = _sampled(self.tension, times)
         if not (wanted > 0.0).all():
-            message = (
+            raise BadValueError(
                 f"ConstantTension: the tension must be positive at all times; it falls to {wanted.min():g} N."
             )
-            raise BadValueError(message)
         return wanted
 
 

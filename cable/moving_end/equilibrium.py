@@ -256,7 +256,7 @@ def _keep(line: Line, c: CableNumbers, work: Load) -> None:
         line.ends.last_length[level] = line.ends.last_length[NOW]
     for level in (NOW, BEFORE):
         for j in range(1, N + 1):
-            segment_momentum(line, level, j, length_at(line, NOW, j), c, work)
+            segment_momentum(line, level, j, c, work)
 
 
 @compiled

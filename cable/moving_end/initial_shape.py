@@ -136,8 +136,7 @@ def start_in_water(line: Line, water: Water, c: CableNumbers, work: Load) -> Non
             for i in range(3):
                 line.water[level, j, i] = line.water[NEW, j, i]
         for j in range(1, line.ends.count + 1):
-            length = line.ends.last_length[level] if j == line.ends.count else line.length[j]
-            segment_momentum(line, level, j, length, c, work)
+            segment_momentum(line, level, j, c, work)
 
 
 def _set_steady_tow(

@@ -200,4 +200,4 @@ def _apply(line: Line, tangents: np.ndarray, change: np.ndarray, c: CableNumbers
     # Differences of second order across the jump would be wrong: the next step has no past.
     line.ends.previous_step = 0.0
     for j in range(1, N + 1):
-        segment_momentum(line, NOW, j, length_at(line, NOW, j), c, work)
+        segment_momentum(line, NOW, j, c, work)

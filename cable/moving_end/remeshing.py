@@ -91,8 +91,8 @@ def split_last(line: Line, segment_length: float, c: CableNumbers, work: Load) -
     line.ends.settled += segment_length
     # Momenta are remembered for whole segments (d(ℓp)/dt in `assembly`), so both parts need theirs at both levels.
     for level in (NOW, BEFORE):
-        segment_momentum(line, level, N, segment_length, c, work)
-        segment_momentum(line, level, N + 1, line.ends.last_length[level], c, work)
+        segment_momentum(line, level, N, c, work)
+        segment_momentum(line, level, N + 1, c, work)
 
 
 @compiled
@@ -145,7 +145,7 @@ def merge_last(line: Line, c: CableNumbers, work: Load) -> None:
     line.ends.count, line.ends.solver.factored = N - 1, False
     line.ends.settled -= line.length[N - 1]
     for level in (NOW, BEFORE):
-        segment_momentum(line, level, N - 1, last[level], c, work)
+        segment_momentum(line, level, N - 1, c, work)
 
 
 @inner
@@ -166,7 +166,7 @@ def join_far(line: Line, c: CableNumbers, work: Load) -> None:
             if cut_off <= STRAIGHT:
                 _join(line, j, whole, cut_off)
                 for level in (NOW, BEFORE):
-                    segment_momentum(line, level, j, line.length[j], c, work)
+                    segment_momentum(line, level, j, c, work)
         # In one pass a segment is joined once at most: the next pair begins after it.
         along += line.length[j]
         j += 1

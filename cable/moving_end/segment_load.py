@@ -22,7 +22,7 @@ from math import sqrt
 import numpy as np
 
 from cable.moving_end.slack_law import chord_length, squared_share, turning_rate
-from cable.moving_end.state import NOW, Line, select_section
+from cable.moving_end.state import NOW, Line, length_at, select_section
 from cable.properties import AlongCableNumbers, CableNumbers
 from subzero.jit import Record, by_field, inlined, inner, made_once
 
@@ -192,12 +192,12 @@ def take_segment(x: np.ndarray, V: np.ndarray, J: np.ndarray, j: int, work: Load
 
 
 @inner
-def segment_momentum(line: Line, level: int, j: int, length: float, c: CableNumbers, work: Load) -> None:
+def segment_momentum(line: Line, level: int, j: int, c: CableNumbers, work: Load) -> None:
     """Fill ∫p ds of segment j at a level; the tangent is the one of level NOW, where the segment has a length."""
     # At an earlier level the growing segment may have had no length, and so no tangent.
     take_segment(line.position[NOW], line.velocity[level], line.water[level], j, work)
     select_section(line, c, j)
-    whole = line.ends.last_length[NOW] if j == line.ends.count else line.length[j]
+    whole, length = length_at(line, NOW, j), length_at(line, level, j)
     r = chord_length(squared_share(work.chord, whole), whole)
     for i in range(3):
         work.tangent[i] = work.chord[i] / r
