@@ -16,7 +16,7 @@ from typing import Any
 
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.files import Source, parsed, read_toml, shipped, shipped_path
-from scenarios.parameters import parameter_names, parameter_values, quantity_of
+from scenarios.parameters import known_numbers
 from scenarios.parts import PATTERNS, Part, leaves, part_of, read_changes, read_part, unit_of
 from scenarios.quantities import Quantity
 from scenarios.trial import Trial
@@ -208,20 +208,16 @@ def _of_trial(trial: Trial, source: Source) -> Contents:
     """Return the numbers of a trial that are not in another file, and those of other files that it changes."""
     changes, _ = read_changes(source)
     numbers = []
-    for name in parameter_names(trial):
-        row: Any = quantity_of(trial, name)
+    for name, (row, values) in known_numbers(trial).items():
         if isinstance(row, Quantity):
-            low, high, words = row.low, row.high, row.meaning
+            unit, low, high, words = row.unit, row.low, row.high, row.meaning
         elif name in changes:
             low, high = row.get("range", (float("nan"), float("nan")))
-            words = "changed by this trial"
+            unit, words = str(row["unit"]), "changed by this trial"
         else:
             continue
-        values = tuple(parameter_values(trial, name))
-        unit = row.unit if isinstance(row, Quantity) else str(row["unit"])
-        numbers.append(
-            Number(name=name, values=values, unit=unit, low=float(low), high=float(high), source=words)
-        )
+        found, low, high = tuple(float(value) for value in values), float(low), float(high)
+        numbers.append(Number(name=name, values=found, unit=unit, low=low, high=high, source=words))
     parts = {kind: str(source.table[kind]) for kind in ("vehicle", "cable")}
     return Contents(
         kind="trial", name=trial.name, description=trial.description, numbers=tuple(numbers), parts=parts

@@ -121,7 +121,7 @@ def parameter(trial: Trial, name: str) -> float:
 
 def _found(trial: Trial, name: str) -> tuple[Row, np.ndarray]:
     """Return the quantity of a number and its value or values; refuse a name that the trial does not have."""
-    found, at = _known(trial).get(_list_of(name)), _at(name)
+    found, at = known_numbers(trial).get(_list_of(name)), _at(name)
     if found is None or (at is not None and at >= len(found[1])):
         raise ScenarioError([_unknown(trial, name)])
     return found
@@ -129,7 +129,7 @@ def _found(trial: Trial, name: str) -> tuple[Row, np.ndarray]:
 
 def parameter_names(trial: Trial) -> tuple[str, ...]:
     """Return the names of all numbers of a trial; lists by their name alone, without ``[1]``."""
-    return tuple(_known(trial))
+    return tuple(known_numbers(trial))
 
 
 def parameter_unit(trial: Trial, name: str) -> str:
@@ -258,7 +258,7 @@ def _part_rows(trial: Trial) -> dict[str, Leaf]:
     return changeable() | {f"vehicle.{key}": leaf for key, leaf in own.items()}
 
 
-def _known(trial: Trial) -> dict[str, tuple[Row, np.ndarray]]:
+def known_numbers(trial: Trial) -> dict[str, tuple[Row, np.ndarray]]:
     """Return dotted name → its quantity, and its value or values (n,), in the unit of the files."""
     known: dict[str, tuple[Row, np.ndarray]] = {}
     for name, row in _part_rows(trial).items():
@@ -318,7 +318,7 @@ def _complaint(value: object, quantity: Quantity) -> tuple[str, str] | None:
 
 def _unknown(trial: Trial, name: str) -> Problem:
     """Return the problem of a name that a trial does not have, with the nearest."""
-    known = _known(trial)
+    known = known_numbers(trial)
     if _list_of(name) in known:
         count = len(known[_list_of(name)][1])
         remedy = f"Allowed: {_list_of(name)}[0] to [{count - 1}], or without [ ] for all of them."

@@ -35,19 +35,10 @@ Page = create_model("Page", __config__=STRICT, **PAGE_FIELDS)
 """A whole trial file; the contents of the sections are checked by `check_section`."""
 
 
-class FileReference(BaseModel):
-    """A section of samples that stand in a CSV file."""
-
-    model_config = STRICT
-
-    file: str
-
-
-class MotionReference(FileReference):
-    """A motion that stands in a CSV file."""
-
-    interpolation: Literal["linear", "smooth"] | None = None
-
+FILE_REFERENCE = create_model("FileReference", __config__=STRICT, file=(str, ...))
+MOTION_FIELDS: dict[str, Any] = {"interpolation": (Literal[INTERPOLATIONS] | None, None)}
+MOTION_REFERENCE = create_model("MotionReference", __base__=FILE_REFERENCE, **MOTION_FIELDS)
+"""Sections of samples that stand in a CSV file: of commands, and of a motion."""
 
 MODELS_KEPT = 32
 """Every section has one, and the commands of each of the last few vehicles with actuators of their own."""
@@ -71,7 +62,7 @@ def section_model(name: str, quantities: tuple[Quantity, ...]) -> type[BaseModel
     if name == "start":
         fields["at_trim"] = (bool, False)
     if name == "motion":
-        fields["interpolation"] = (Literal[INTERPOLATIONS] | None, None)
+        fields |= MOTION_FIELDS
     return create_model(name, __config__=STRICT, **fields)
 
 
@@ -98,7 +89,7 @@ def check_section(
     if not isinstance(raw, Mapping):
         return {}, []  # `check_page` has said so
     if name in LISTS and "file" in raw:
-        reference = MotionReference if name == "motion" else FileReference
+        reference = MOTION_REFERENCE if name == "motion" else FILE_REFERENCE
         return _validate(reference, source, name, raw, {})
     rows = SECTIONS[name] if rows is None else rows
     quantities = {quantity.name: quantity for quantity in rows}
