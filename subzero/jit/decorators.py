@@ -22,9 +22,6 @@ from subzero.jit.machine_code import MachineCode
 from subzero.jit.signals import deferred_signals
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-Line = TypeVar("Line")
-Special = TypeVar("Special")
-General = TypeVar("General")
 Result = TypeVar("Result")
 
 LEVEL = type(numba.config.OPT)(1)
@@ -171,50 +168,23 @@ def _plain(kernel: Any, kinds: Any) -> FunctionType:
 
 
 def by_field(
-    field: str, yes: Callable[[Line, Special], Result], no: Callable[[Line, General], Result]
-) -> Callable[[Line, General], Result]:
-    """Return a function (line, c) that is `yes` where the record c has a field, else `no`; only one is compiled.
+    field: str, yes: Callable[..., Result], no: Callable[..., Result]
+) -> Callable[..., Result]:
+    """Return a function (line, c, …) that is `yes` where the record c has a field, else `no`; only one is compiled.
 
     So a feature of few simulations does not lengthen the first compilation of all others.
     """
 
-    def choose(line, c):  # type: ignore[no-untyped-def]  # numba compares annotations of the two, too
-        return (yes if field in c.dtype.names else no)(line, c)
+    def choose(line, c, *more):  # type: ignore[no-untyped-def]  # numba compares annotations of the two, too
+        return (yes if field in c.dtype.names else no)(line, c, *more)
 
-    def typed(line, c):  # type: ignore[no-untyped-def]
+    def typed(line, c, *more):  # type: ignore[no-untyped-def]
         return _plain(yes if field in c.fields else no, (line, c))
 
-    numba.extending.overload(choose)(typed)
+    # Not strict: what is chosen has names and a number of arguments of its own.
+    numba.extending.overload(choose, strict=False)(typed)
     return choose
 
 
-def by_field_at(
-    field: str, yes: Callable[[Line, Special, int], Result], no: Callable[[Line, General, int], Result]
-) -> Callable[[Line, General, int], Result]:
-    """Return such a function (line, c, index of a segment)."""
-
-    def choose(line, c, j):  # type: ignore[no-untyped-def]
-        return (yes if field in c.dtype.names else no)(line, c, j)
-
-    def typed(line, c, j):  # type: ignore[no-untyped-def]
-        return _plain(yes if field in c.fields else no, (line, c))
-
-    numba.extending.overload(choose)(typed)
-    return choose
-
-
-def by_field_in_step(
-    field: str,
-    yes: Callable[[Line, Special, Any, bool], Result],
-    no: Callable[[Line, General, Any, bool], Result],
-) -> Callable[[Line, General, Any, bool], Result]:
-    """Return such a function (line, c, weights of the step, whether slopes are asked for)."""
-
-    def choose(line, c, w, slopes):  # type: ignore[no-untyped-def]
-        return (yes if field in c.dtype.names else no)(line, c, w, slopes)
-
-    def typed(line, c, w, slopes):  # type: ignore[no-untyped-def]
-        return _plain(yes if field in c.fields else no, (line, c))
-
-    numba.extending.overload(choose)(typed)
-    return choose
+by_field_at = by_field_in_step = by_field
+"""The same for (line, c, index of a segment), and (line, c, weights of the step, whether slopes are asked for)."""
