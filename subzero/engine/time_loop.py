@@ -18,8 +18,8 @@ from subzero.engine.coupling import FINE, exchange
 from subzero.engine.recording import Recording, note, record_row, row_of
 from subzero.engine.run_state import Live, Setup
 from subzero.jit import allocating, compiled, deferred_signals
-from subzero.jit.atomic import add
-from subzero.jit.atomic import exchange as exchange_number
+from subzero.jit.intrinsics import add
+from subzero.jit.intrinsics import exchange as exchange_number
 
 NO_SPACE = 4
 """The allocated memory is nearly full: enlarge it and go on. The other endings are in `coupling`."""

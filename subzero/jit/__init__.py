@@ -5,10 +5,10 @@ name                                            purpose                         
 compiled, allocating, inner, inlined,
 gated_inlined, by_field, by_field_at …          how a function is compiled                            decorators
 Record, made_once                               numbers as one record in memory, a single pointer     record
-scratch                                         a small array on the stack of a compiled function     stack
+scratch                                         a small array on the stack of a compiled function     intrinsics
+add, exchange                                   whole numbers that threads change together            intrinsics
 compile_in_parallel, Call                       a second process compiles at the same time            parallel
 deferred_signals                                signals wait while code is compiled                   signals
-atomic.add, atomic.exchange                     whole numbers that threads change together            atomic
 -                                               compiled code kept for the next run                   machine_code
 """
 
@@ -22,10 +22,10 @@ from subzero.jit.decorators import (
     inlined,
     inner,
 )
+from subzero.jit.intrinsics import scratch
 from subzero.jit.parallel import Call, compile_in_parallel
 from subzero.jit.record import Record, made_once
 from subzero.jit.signals import deferred_signals
-from subzero.jit.stack import scratch
 
 __all__ = [
     "Call",

@@ -167,9 +167,7 @@ def _plain(kernel: Any, kinds: Any) -> FunctionType:
     return plain
 
 
-def by_field(
-    field: str, yes: Callable[..., Result], no: Callable[..., Result]
-) -> Callable[..., Result]:
+def by_field(field: str, yes: Callable[..., Result], no: Callable[..., Result]) -> Callable[..., Result]:
     """Return a function (line, c, …) that is `yes` where the record c has a field, else `no`; only one is compiled.
 
     So a feature of few simulations does not lengthen the first compilation of all others.

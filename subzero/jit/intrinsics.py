@@ -1,6 +1,10 @@
-"""Small work arrays of a compiled function, on its own stack, at no cost.
+"""Functions that numba lacks: small work arrays on the stack, and whole numbers that threads change together.
 
-`np.empty` allocates memory, which takes longer than the force on a fin.
+`np.empty` allocates memory, which takes longer than the force on a fin; an array of `scratch` stands on the stack of
+the compiled function, at no cost.
+
+Each change of a number by `add` and `exchange` is whole, and all threads see them in one order. What a thread wrote
+before such a change, another one reads that has seen the change (`acq_rel` of LLVM's language reference).
 """
 
 from __future__ import annotations
@@ -13,6 +17,39 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
+
+NUMBERS = types.Array(types.int64, 1, "C")
+
+
+def _intrinsic(operation: str) -> Any:
+    """Return the function (number (1,), operand) → the number before the operation."""
+
+    def typed(context: Any, number: Any, operand: Any) -> Any:
+        def generate(target: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            array = target.make_array(NUMBERS)(target, builder, arguments[0])
+            return builder.atomic_rmw(operation, array.data, arguments[1], "acq_rel")
+
+        return types.int64(NUMBERS, types.int64), generate
+
+    typed.__name__ = f"atomic_{operation}"
+    return intrinsic(typed)
+
+
+def _add(number: np.ndarray, operand: int) -> int:
+    """Add to a number in code that is not compiled, for which Python's lock is held only so long."""
+    number[0] += operand
+    return int(number[0] - operand)
+
+
+def _exchange(number: np.ndarray, operand: int) -> int:
+    before, number[0] = int(number[0]), operand
+    return before
+
+
+add = _add if numba.config.DISABLE_JIT else _intrinsic("add")
+"""(number (1,) of int64, the amount) → the number before."""
+exchange = _exchange if numba.config.DISABLE_JIT else _intrinsic("xchg")
+"""(number (1,) of int64, another one) → the number before."""
 
 
 def _interpreted(rows: int, columns: int) -> np.ndarray:
