@@ -25,7 +25,7 @@ import numpy as np
 import subzero
 from benchmarks.peers import numpy_hull
 from benchmarks.tether import counting_gain
-from subzero.simulation.stepping_group import SteppingGroup
+from subzero.simulation.stepper import SteppingGroup
 
 SEGMENTS = (0, 25, 50, 100, 200)
 PAID_OUT = 28

@@ -26,8 +26,7 @@ from subzero.arguments import checked_arguments
 from subzero.channels import Observation
 from subzero.errors import BadValueError, checked, missing_extra, short, whole
 from subzero.model import load
-from subzero.simulation.stepper import RunStoppedError, Simulator
-from subzero.simulation.stepping_group import SteppingGroup
+from subzero.simulation.stepper import RunStoppedError, Simulator, SteppingGroup
 
 try:
     import gymnasium

@@ -17,17 +17,24 @@ A vehicle with listed actuators, such as thrusters, takes their commands behind 
     0.1
 
 Each step holds a command for one sample time. The exchanges of hull and cable inside are those of `subzero.simulate`:
-the same commands give the same numbers, to the last bit.
+the same commands give the same numbers, to the last bit. A `SteppingGroup` steps many simulators together, by some
+threads: each takes the next one that no other has taken.
 """
 
 from __future__ import annotations
 
+import time
+import weakref
 from collections.abc import Mapping, Sequence
 from itertools import islice
 from math import isfinite, pi
+from operator import is_
 from pathlib import Path
+from queue import SimpleQueue
+from threading import Thread
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numba
 import numpy as np
 
 import scenarios
@@ -38,7 +45,18 @@ from subzero.engine import coupling
 from subzero.engine.initial_conditions import prepare
 from subzero.engine.recording import Recording, Run, cut, new_recording, record_row
 from subzero.engine.run_state import Live, Orders, Setup
-from subzero.engine.time_loop import ENDING, NO_SPACE, ROW, USED, advance, hold, observe
+from subzero.engine.time_loop import (
+    ENDING,
+    NO_SPACE,
+    ROW,
+    USED,
+    advance,
+    begin,
+    hold,
+    hold_batch,
+    observe,
+    share,
+)
 from subzero.errors import UserError, real, short, suggestion
 from subzero.model import Model, load, model_of
 from subzero.simulation.run import SPARE_SEGMENTS, WENT_WELL, enlarged_run, in_words
@@ -77,17 +95,9 @@ class Held(NamedTuple):
     handle: Any
 
     @classmethod
-    def of(
-        cls,
-        setup: Setup,
-        live: Live,
-        recording: Recording,
-        times: np.ndarray,
-        at: np.ndarray,
-        seen: np.ndarray,
-    ) -> Held:
-        """Return a run with its handle."""
-        return cls(setup, live, recording, times, at, seen, hold(setup, live, recording, times))
+    def of(cls, arrays: tuple[Setup, Live, Recording, np.ndarray], at: np.ndarray, seen: np.ndarray) -> Held:
+        """Return a run with its handle; `arrays` are its setup, state and recording, and the times of its rows."""
+        return cls(*arrays, at, seen, hold(*arrays))
 
 
 class CommandError(UserError, ValueError):
@@ -148,7 +158,7 @@ class Simulator:
         used = record_row(setup, live, recording, 0, 0.0, 0)
         at, seen = np.array([0, used, coupling.FINE]), np.zeros(len(Observation._fields))
         seen[6] = pi - 1e-12  # headings begin in [0, 2π), as in `subzero.results.dataset`
-        held = Held.of(setup, live, recording, times, at, seen)
+        held = Held.of((setup, live, recording, times), at, seen)
         observe(held.handle, 0, seen)
         self._held = held
         return self.observation
@@ -209,7 +219,7 @@ class Simulator:
             if ending != NO_SPACE:
                 break
             live, recording = enlarged_run(held.live, held.recording, int(held.at[USED]))
-            self._held = Held.of(held.setup, live, recording, held.times, held.at, held.seen)
+            self._held = Held.of((held.setup, live, recording, held.times), held.at, held.seen)
 
     def result(self) -> xr.Dataset:
         """Return the run so far as `subzero.simulate` does: channels with units, forces, the cable's shape."""
@@ -283,7 +293,8 @@ def _with_rows(held: Held, goal: int) -> Held:
     for name, values in old._asdict().items():
         getattr(new, name)[: values.shape[0]] = values
     further = whole_steps(times[1], rows)[times.size :]
-    return Held.of(held.setup, held.live, new, np.concatenate([times, further]), held.at, held.seen)
+    arrays = held.setup, held.live, new, np.concatenate([times, further])
+    return Held.of(arrays, held.at, held.seen)
 
 
 def _times(trial: scenarios.Trial) -> np.ndarray:
@@ -308,3 +319,78 @@ def _exchanges(trial: scenarios.Trial, sample_time: float | None, tethered: bool
             f" {trial.cable_step:g} s each."
         )
     return round(count)
+
+
+class SteppingGroup:
+    """Simulators of one trial, one model and one sample time.
+
+    The thread that calls does not wait for the others to wake, which takes as long as some steps: it begins, and they
+    take the remaining ones. Nor do they sleep at once: the next steps may come before they would be awake again.
+
+    Args:
+        simulators: none of them has stopped; nothing else steps them in the meantime.
+        threads: how many step them, the one that calls among them.
+    """
+
+    def __init__(self, simulators: Sequence[Simulator], threads: int) -> None:
+        self._simulators, self._exchanges = simulators, simulators[0]._exchanges
+        self._orders, self._held = np.zeros((len(simulators), 4)), list[Held]()
+        self._shown = np.zeros((len(simulators), len(Observation._fields)))
+        self._reached = np.zeros((len(simulators), 2), np.int64)
+        self._others = 0 if numba.config.DISABLE_JIT else threads - 1
+        self._batch: Any = None
+        self._is_stepping = False
+        self._asked: SimpleQueue[Any] = SimpleQueue()
+        for _ in range(self._others):
+            Thread(target=_help, args=(self._asked, self._exchanges), daemon=True).start()
+        self.close = weakref.finalize(self, _end, self._asked, self._others)
+
+    def hold(self, orders: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Hold a command in each, as `Simulator.hold` does.
+
+        Args:
+            orders: propeller [rev/s], rudder, port and starboard stern-plane [rad] of each (simulators, 4).
+
+        Returns:
+            which of them cannot go on, and `Simulator.seen` of all (simulators, 27).
+        """
+        if self._is_stepping:
+            self._finish()  # what an interrupt has broken off
+        self._take([each._held for each in self._simulators])
+        self._orders[:] = orders
+        self._is_stepping = True
+        begin(self._batch)
+        for _ in range(self._others - self._asked.qsize()):
+            self._asked.put(self._batch)
+        self._finish()
+        goals, endings = self._reached.T
+        for i in np.flatnonzero(endings == NO_SPACE).tolist():
+            each = self._simulators[i]
+            each._reach(int(goals[i]), *self._orders[i].tolist())
+            endings[i], self._shown[i] = each._held.at[ENDING], each.seen
+        return endings != coupling.FINE, self._shown.copy()
+
+    def _take(self, held: list[Held]) -> None:
+        """Take the runs as they are now: after a reset, or with space for more rows, they are other arrays."""
+        if self._held and all(map(is_, held, self._held)):
+            return
+        handles, at, seen = zip(*((each.handle, each.at, each.seen) for each in held), strict=True)
+        batch = hold_batch(handles, at, seen, self._orders, self._shown, self._reached)
+        self._held, self._batch = held, batch
+
+    def _finish(self) -> None:
+        """Take what no other thread has taken, and wait for what the others have."""
+        while not share(self._batch, self._exchanges, False):
+            time.sleep(0.0)
+        self._is_stepping = False
+
+
+def _help(asked: SimpleQueue[Any], exchanges: int) -> None:
+    """Share the batches of a group, as they come."""
+    while (batch := asked.get()) is not None:
+        share(batch, exchanges, True)
+
+
+def _end(asked: SimpleQueue[Any], threads: int) -> None:
+    for _ in range(threads):
+        asked.put(None)

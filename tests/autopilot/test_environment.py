@@ -15,7 +15,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import subzero.gym_environment
-from subzero.simulation import stepping_group
+from subzero.simulation import stepper
 
 
 @pytest.fixture
@@ -98,7 +98,7 @@ def test_many_at_once_are_those_of_one_after_another_to_the_last_bit(monkeypatch
 @pytest.mark.parametrize("how, threads", [({}, 2), ({"sample_time": 1.0}, 2), ({"workers": 1}, 1)])
 def test_each_processor_has_a_thread_if_nothing_else_is_asked_for(monkeypatch, how, threads):
     """On a machine of two processors."""
-    used, meet, share = set(), threading.Barrier(threads), stepping_group.share
+    used, meet, share = set(), threading.Barrier(threads), stepper.share
 
     def seen_to_share(*how):
         if threading.get_ident() not in used:
@@ -107,7 +107,7 @@ def test_each_processor_has_a_thread_if_nothing_else_is_asked_for(monkeypatch, h
         return share(*how)
 
     monkeypatch.setattr(subzero.gym_environment.os, "cpu_count", lambda: 2)
-    monkeypatch.setattr(stepping_group, "share", seen_to_share)
+    monkeypatch.setattr(stepper, "share", seen_to_share)
     made = gymnasium.make_vec(subzero.gym_environment.ENVIRONMENT, num_envs=2, **how)
     made.reset(seed=1)
     made.step(np.zeros((2, 1), dtype=np.float32))

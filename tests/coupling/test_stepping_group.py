@@ -1,8 +1,8 @@
 """Simulators that threads step together do what each does alone.
 
-Verifies: `subzero.simulation.stepping_group` against `Simulator.hold`, to the last bit, for fewer and more threads than
-simulators, over resets and beyond the rows that fit at first; that a step which an interrupt breaks off is finished
-before the next one. Tolerance: none.
+Verifies: `subzero.simulation.stepper.SteppingGroup` against `Simulator.hold`, to the last bit, for fewer and more
+threads than simulators, over resets and beyond the rows that fit at first; that a step which an interrupt breaks off is
+finished before the next one. Tolerance: none.
 """
 
 import threading
@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import subzero
-from subzero.simulation import stepping_group
-from subzero.simulation.stepping_group import SteppingGroup
+from subzero.simulation import stepper
+from subzero.simulation.stepper import SteppingGroup
 
 COUNT = 5
 TURNS = np.random.default_rng(3).uniform(-0.3, 0.3, (40, COUNT))
@@ -52,16 +52,16 @@ def test_threads_give_the_numbers_of_one_after_another(threads):
 
 def test_a_step_that_is_broken_off_is_finished_before_the_next(monkeypatch):
     alone, together = simulators(), simulators()
-    group, share = SteppingGroup(together, 2), stepping_group.share
+    group, share = SteppingGroup(together, 2), stepper.share
 
     def interrupted(*how):
         if threading.current_thread() is not threading.main_thread():
             return share(*how)
-        monkeypatch.setattr(stepping_group, "share", share)
+        monkeypatch.setattr(stepper, "share", share)
         raise KeyboardInterrupt
 
     group.hold(orders(TURNS[0]))
-    monkeypatch.setattr(stepping_group, "share", interrupted)
+    monkeypatch.setattr(stepper, "share", interrupted)
     with pytest.raises(KeyboardInterrupt):
         group.hold(orders(TURNS[1]))
     group.hold(orders(TURNS[2]))
