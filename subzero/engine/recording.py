@@ -283,21 +283,21 @@ BY_NODE, BY_TIME = ("position", "tension", "arc_length"), ("trace",)
 
 def cut(recording: Recording, rows: int, used: int) -> Recording:
     """Return the part of a recording that is filled; its trace is not changed."""
-    filled = {name: getattr(recording, name)[:used] for name in BY_NODE}
-    filled |= {name: getattr(recording, name) for name in BY_TIME}
-    by_row = {name: values[:rows] for name, values in recording._asdict().items() if name not in filled}
-    return Recording(**by_row | filled)
+    return _part(recording, slice(rows), slice(used))
 
 
 def thinned(run: Run, stride: int) -> Run:
     """Return every so many rows of a run, and its last one."""
     rows = np.arange(run.times.size)
     keep = (rows % stride == 0) | (rows == rows[-1])
-    nodes = np.repeat(keep, run.recording.nodes)
-    kept = {name: getattr(run.recording, name)[nodes] for name in BY_NODE}
-    kept |= {name: getattr(run.recording, name) for name in BY_TIME}
-    by_row = {name: values[keep] for name, values in run.recording._asdict().items() if name not in kept}
-    return replace(run, times=run.times[keep], recording=Recording(**by_row | kept))
+    part = _part(run.recording, keep, np.repeat(keep, run.recording.nodes))
+    return replace(run, times=run.times[keep], recording=part)
+
+
+def _part(recording: Recording, rows: slice | np.ndarray, nodes: slice | np.ndarray) -> Recording:
+    """Return some rows and some nodes of a recording, and its whole trace."""
+    which = dict.fromkeys(BY_NODE, nodes) | dict.fromkeys(BY_TIME, slice(None))
+    return Recording(*(values[which.get(name, rows)] for name, values in recording._asdict().items()))
 
 
 def run_so_far(
