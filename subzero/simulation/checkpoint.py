@@ -15,10 +15,11 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import count
 from pathlib import Path
 from time import monotonic
 from typing import Any
@@ -78,23 +79,6 @@ class Checkpoint:
             shutil.rmtree(manifest.parent)
         with suppress(OSError):
             Path(self.folder).rmdir()
-
-
-class Keeper:
-    """Keeps the runs that one simulation makes, in their order; `opened` gives one.
-
-    Args:
-        folder: where to.
-        every: from one checkpoint to the next. [s]
-    """
-
-    def __init__(self, folder: Path, every: float) -> None:
-        self._folder, self._every, self._runs = folder, every, 0
-
-    def next_run(self) -> KeptRun:
-        """Return the keeper of the next run."""
-        self._runs += 1
-        return KeptRun(self._folder / f"run-{self._runs}", self._every)
 
 
 class KeptRun:
@@ -254,9 +238,12 @@ def _damage_named(path: Path) -> Iterator[None]:
         ) from error
 
 
+Keeper = Callable[[], KeptRun]
+
+
 @contextmanager
 def opened(checkpoint: Checkpoint, label: str, manifest: Mapping[str, str]) -> Iterator[Keeper]:
-    """Return the keeper of the runs of a simulation.
+    """Return the keeper of the runs of a simulation: a function that gives that of the next run, in their order.
 
     Args:
         checkpoint: where and how often.
@@ -271,7 +258,8 @@ def opened(checkpoint: Checkpoint, label: str, manifest: Mapping[str, str]) -> I
         folder.mkdir(parents=True, exist_ok=True)
         with _locked(folder):
             _refuse_another(folder, manifest)
-            yield Keeper(folder, MINUTE_S * checkpoint.minutes)
+            numbers = count(1)
+            yield lambda: KeptRun(folder / f"run-{next(numbers)}", MINUTE_S * checkpoint.minutes)
 
 
 @contextmanager

@@ -22,7 +22,7 @@ import xarray as xr
 
 import scenarios
 from subzero.arguments import checked_arguments
-from subzero.channels import BY_NAME, CHANNELS, HEADING, UNITS
+from subzero.channels import BY_NAME, CHANNELS, ENERGY_CHANNELS, HEADING, UNITS
 from subzero.engine.initial_conditions import Later
 from subzero.errors import UserError
 from subzero.files.text_repr import Overview, shown
@@ -30,6 +30,7 @@ from subzero.model import Model, load, model_of
 from subzero.records.record import Fit, Record, fits, measured_alone, modelled, read_record, with_heading_of
 from subzero.results.summary import FORCE, MOMENT, summarise, summary_of
 from subzero.simulation.memory_estimate import THINNED, thinning_notice, with_fewer_results
+from subzero.simulation.refinement import part_of
 from subzero.simulation.run import simulate
 from subzero.validity import RunWarning, as_json, warnings_of
 
@@ -134,8 +135,8 @@ def compare(
     asked, trial = trial, _same_rows(trial, model, record)
     given = {"model": model, "later": later, "checkpoint": checkpoint}
     other: dict[str, Any] = {name: value for name, value in given.items() if value}
-    tethered = simulate(trial, tethered=True, **other, progress=_part(progress, 0.0, 0.5))
-    untethered = simulate(trial, tethered=False, **other, progress=_part(progress, 0.5, 1.0))
+    tethered = simulate(trial, tethered=True, **other, progress=part_of(progress, 0.0, 0.5))
+    untethered = simulate(trial, tethered=False, **other, progress=part_of(progress, 0.5, 1.0))
     if trial is not asked and record is None:
         for run in (tethered, untethered):
             run.attrs[THINNED] = thinning_notice(trial)
@@ -174,22 +175,12 @@ VECTORS = (
     ("surge_speed", "sway_speed", "heave_speed"),
     ("roll_rate", "pitch_rate", "yaw_rate"),
     ("tow_velocity_tangential", "tow_velocity_normal", "tow_velocity_binormal"),
-    tuple(c.name for c in CHANNELS if c.name.startswith("energy_")),
+    ENERGY_CHANNELS,
 )
 """Channels that are parts of one thing: each is held against the largest of them, for a change of a part that hardly
 matters is none of the whole."""
-NOTHING = {
-    "m": 1e-6,
-    "m/s": 1e-6,
-    "degree": 1e-4,
-    "degree/s": 1e-4,
-    "rev/s": 1e-6,
-    "V": 1e-6,
-    "N": 1e-6,
-    "N m": 1e-7,
-    "J": 1e-6,
-}
-"""A channel that never gets larger than this, by unit, is zero, and a share of it means nothing."""
+NOTHING, NOTHING_OF = 1e-6, {"degree": 1e-4, "degree/s": 1e-4, "N m": 1e-7}
+"""A channel that never gets larger than this, or what its unit has instead, is zero: a share of it means nothing."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -278,8 +269,8 @@ def check(
         scenarios.ScenarioError: the scenario cannot be used, or half its steps are below their limits.
     """
     trial = scenario if isinstance(scenario, scenarios.Trial) else load(scenario)
-    run = simulate(trial, tethered=tethered, model=model, later=later, progress=_part(progress, 0.0, 0.2))
-    return refine(run, trial, model, later=later, progress=_part(progress, 0.2, 1.0))
+    run = simulate(trial, tethered=tethered, model=model, later=later, progress=part_of(progress, 0.0, 0.2))
+    return refine(run, trial, model, later=later, progress=part_of(progress, 0.2, 1.0))
 
 
 def refine(
@@ -336,14 +327,9 @@ def _row(name: str, parts: tuple[str, ...], run: xr.Dataset, finer: xr.Dataset) 
     else:
         whole = next((vector for vector in VECTORS if name in vector), parts)
         largest = max(float(np.abs(finer[part].values).max()) for part in whole)
-    if not np.isfinite(difference).all() or not largest >= NOTHING[unit]:
+    if not np.isfinite(difference).all() or not largest >= NOTHING_OF.get(unit, NOTHING):
         return None
     worst = int(difference.argmax())
     change = float(difference[worst])
     row = {"channel": name, "change": change / largest, "difference": change, "largest": largest}
     return {**row, "time": float(time[worst]), "unit": unit}
-
-
-def _part(progress: Progress | None, begin: float, end: float) -> Progress | None:
-    """Return a progress that fills a part of another."""
-    return (lambda done: progress(begin + (end - begin) * done)) if progress is not None else None

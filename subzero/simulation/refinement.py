@@ -213,8 +213,8 @@ def run_converged(
     if side_by_side:
         run, coarse, take = _side_by_side(take, (trial, whole), (coarser, coarse_grid), progress)
     else:
-        run = take(trial, whole, _share(progress, 0.0, 0.7))
-        coarse = _taken(take, coarser, coarse_grid, _share(progress, 0.7, 0.3))
+        run = take(trial, whole, part_of(progress, 0.0, 0.7))
+        coarse = _taken(take, coarser, coarse_grid, part_of(progress, 0.7, 1.0))
     # The budget depends on the work of the run as asked for, which is known only now.
     budget.grant(run)
     if coarse is None:
@@ -472,6 +472,6 @@ def _iterated(run: Run) -> float:
     return float(run.recording.iterations[-1]) * _mean_nodes(run)
 
 
-def _share(progress: Progress | None, start: float, size: float) -> Progress | None:
+def part_of(progress: Progress | None, start: float, end: float) -> Progress | None:
     """Return a progress that fills a part of another."""
-    return None if progress is None else lambda fraction: progress(start + size * fraction)
+    return None if progress is None else lambda fraction: progress(start + (end - start) * fraction)

@@ -258,7 +258,7 @@ def run_trial(
         from subzero.simulation.feng_allen import run_as_printed
 
         return run_as_printed(trial, model, progress)
-    kept = keeper.next_run() if keeper is not None else None
+    kept = keeper() if keeper is not None else None
     now = _initial_run_state(trial, model, tethered, grid)
     now = kept.go_on(now) if kept is not None else now
     pace = Pace()
