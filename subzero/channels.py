@@ -160,6 +160,9 @@ energy_added_mass_term        | J        | E_m         | energy by the cable's a
 energy_residual               | J        | E_r         | energy that the balance leaves unexplained
 """)
 
+ENERGY_CHANNELS = tuple(channel.name for channel in CHANNELS if channel.name.startswith("energy_"))
+"""In the order of `subzero.engine.energy`."""
+
 BY_NAME: dict[str, Channel] = {channel.name: channel for channel in (TIME, *CHANNELS)}
 BY_COLUMN: dict[str, Channel] = {channel.column: channel for channel in (TIME, *CHANNELS)}
 

@@ -21,6 +21,7 @@ import numpy as np
 
 from cable.moving_end import enlarged
 from scenarios import Start, Trial
+from subzero.channels import Observation
 from subzero.engine.coupling import FINE, forget
 from subzero.engine.initial_conditions import RUN_IN, prepare
 from subzero.engine.recording import new_recording
@@ -45,17 +46,7 @@ if TYPE_CHECKING:
     import control
 
 
-CABLE_OUTPUTS = (
-    "cable_length",
-    "cable_tension",
-    "drum_tension",
-    "cable_force_forward",
-    "cable_force_starboard",
-    "cable_force_down",
-    "cable_moment_roll",
-    "cable_moment_pitch",
-    "cable_moment_yaw",
-)
+CABLE_OUTPUTS = Observation._fields[Observation._fields.index("cable_length") :]
 """Outputs of the tethered plant in addition to its hull's states, as channels of `subzero.channels` [m, N, N m]."""
 
 HIDDEN = ("battery_charge", "rudder_linkage", "stern_plane_port_linkage", "stern_plane_starboard_linkage")

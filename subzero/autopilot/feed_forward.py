@@ -228,12 +228,5 @@ class TwinCable(CableModel):
         seen = self._twin.observation
         if not (reading.cable_length > SHORT and seen.cable_length > SHORT):
             return np.zeros(6)
-        pull = (
-            seen.cable_force_forward,
-            seen.cable_force_starboard,
-            seen.cable_force_down,
-            seen.cable_moment_roll,
-            seen.cable_moment_pitch,
-            seen.cable_moment_yaw,
-        )
+        pull = seen[seen._fields.index("cable_force_forward") :]
         return np.array(pull) * (reading.cable_length / seen.cable_length)

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 import scenarios
-from subzero.channels import BY_NAME, CHANNELS, LISTED, TIME, listed_channels
+from subzero.channels import BY_NAME, CHANNELS, ENERGY_CHANNELS, LISTED, TIME, listed_channels
 from subzero.errors import DISTRIBUTION, printable
 from subzero.model import Model
 from subzero.validity import as_json, check_run, notes_on
@@ -33,17 +33,6 @@ if TYPE_CHECKING:
 
 NO_PULL = 1e-9
 """A tow force below this has no direction; then the cable is taken to lie straight behind the vehicle. [N]"""
-
-ENERGY_CHANNELS = (
-    "energy_propeller_work",
-    "energy_hull_loss",
-    "energy_cable_loss",
-    "energy_kinetic_change",
-    "energy_drum",
-    "energy_added_mass_term",
-    "energy_residual",
-)
-"""In the order of `subzero.engine.energy`."""
 
 AXES = {
     "term": (list(BREAKDOWN), "named force of the equation of motion, see vehicle.TERMS"),

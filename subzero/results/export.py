@@ -24,7 +24,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from subzero.arguments import check_is_run, checked_arguments
-from subzero.channels import TIME, channels_of
+from subzero.channels import STANDARD_NAMES, TIME, channels_of
 from subzero.errors import UserError, chosen, missing_extra, printable
 from subzero.files.atomic_output import friendly_errors
 from subzero.results.dataset import cable_origin
@@ -302,16 +302,11 @@ def _lists(run: xr.Dataset) -> Iterator[tuple[str, str, list[np.ndarray]]]:
 
 # netCDF by the conventions.
 
-STANDARD_NAMES = {
+CF_NAMES = STANDARD_NAMES | {
     "time": "time",
-    "depth": "depth",
-    "roll_angle": "platform_roll_starboard_down",
-    "pitch": "platform_pitch_fore_up",
-    "heading": "platform_orientation",
     "roll_rate": "platform_roll_rate_starboard_down",
     "pitch_rate": "platform_pitch_rate_fore_up",
     "yaw_rate": "platform_yaw_rate_fore_starboard",
-    "speed_over_ground": "platform_speed_wrt_ground",
 }
 """Our name → that of the CF standard name table, where it means the same, sign included."""
 UDUNITS = {"rev/s": "revolution s-1"}
@@ -356,8 +351,8 @@ def _describe(name: str, variable: xr.DataArray) -> None:
         about["comment"] = "A run has no date: that of its start is a nominal one."
     elif about.get("units") in UDUNITS:
         about["units"] = UDUNITS[about["units"]]
-    if name in STANDARD_NAMES:
-        about["standard_name"] = STANDARD_NAMES[name]
+    if name in CF_NAMES:
+        about["standard_name"] = CF_NAMES[name]
     if name == "depth":
         about["positive"] = "down"
     if name.endswith("_label"):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from subzero.channels import BY_NAME, AnyRun, channels_of
+from subzero.channels import BY_NAME, ENERGY_CHANNELS, AnyRun, channels_of
 from subzero.records.record import Fit, fits
 from subzero.validity import notes_of, warnings_of
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from subzero.records.record import Record
 
-ENERGY_PARTS = ("hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term", "residual")
+ENERGY_PARTS = tuple(name.removeprefix("energy_") for name in ENERGY_CHANNELS[1:])
 """Where the work of the propulsion goes; their sum is ``energy_propeller_work``."""
 
 FORCE = ("cable_force_forward", "cable_force_starboard", "cable_force_down")

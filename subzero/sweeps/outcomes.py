@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from subzero.arguments import checked_arguments
-from subzero.channels import BY_NAME, AnyRun
+from subzero.channels import BY_NAME, ENERGY_CHANNELS, AnyRun
 from subzero.errors import UserError, real, short, suggestion
 
 if TYPE_CHECKING:
@@ -54,16 +54,7 @@ SUMMARY = (
 """Numbers of `subzero.results.summary.summarise`."""
 
 TABLES = {
-    "energy": (
-        "propeller_work_J",
-        "hull_loss_J",
-        "cable_loss_J",
-        "kinetic_change_J",
-        "drum_J",
-        "added_mass_term_J",
-        "residual_J",
-        "unexplained_share",
-    ),
+    "energy": (*(f"{name.removeprefix('energy_')}_J" for name in ENERGY_CHANNELS), "unexplained_share"),
     "diagnostics": (
         "closure_error_m",
         "energy_residual",

@@ -9,6 +9,7 @@ import numpy as np
 
 from cable import doubts
 from cable.doubts import LIMP, NO_FORCE, RESIDUAL, ROUGH, SLACK_SHARE
+from subzero.channels import ENERGY_CHANNELS
 from subzero.validity.limits import blocks_of, first_time, longest_span, percent
 
 if TYPE_CHECKING:
@@ -46,7 +47,6 @@ CLOSED = 0.01
 """A cable that ends farther from the tow point than this share of its length is not the cable of this vehicle. [-]"""
 PUSHED = 1e-3
 """A cable that pushes harder than this share of its hardest pull is not a cable. [-]"""
-ENERGIES = ("propeller_work", "hull_loss", "cable_loss", "kinetic_change", "drum", "added_mass_term")
 
 
 def energy_residual(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
@@ -58,7 +58,7 @@ def energy_residual(run: AnyRun, trial: scenarios.Trial, _: Model) -> list[str]:
     if run.attrs["prescribed"] and not run.attrs["tethered"]:
         return []  # whatever moves the vehicle does unknown work
     residual = np.abs(run["energy_residual"].values)
-    largest = float(np.abs([run[f"energy_{name}"].values for name in ENERGIES]).max())
+    largest = float(np.abs([run[name].values for name in ENERGY_CHANNELS[:-1]]).max())
     # Residuals are compared with the largest energy: without one there is nothing to compare.
     if not (np.isfinite(residual).all() and np.isfinite(largest)) or largest < NO_ENERGY:
         return []
