@@ -23,37 +23,32 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-_HOME = {
-    "CHANNELS": ("subzero.channels", "CHANNELS"),
-    "Checkpoint": ("subzero.simulation.checkpoint", "Checkpoint"),
-    "Comparison": ("subzero.simulation.comparison", "Comparison"),
-    "Logged": ("subzero.diagnosis.hypothesis.logged", "Logged"),
-    "Model": ("subzero.model", "Model"),
-    "Observation": ("subzero.channels", "Observation"),
-    "Record": ("subzero.records.record", "Record"),
-    "Refinement": ("subzero.simulation.comparison", "Refinement"),
-    "RunWarning": ("subzero.validity", "RunWarning"),
-    "RunStoppedError": ("subzero.simulation.stepper", "RunStoppedError"),
-    "Simulator": ("subzero.simulation.stepper", "Simulator"),
-    "UserError": ("subzero.errors", "UserError"),
-    "calibrate": ("subzero.calibration.api", "calibrate"),
-    "challenge": ("subzero.synthetic.challenge", "challenge"),
-    "check": ("subzero.simulation.comparison", "check"),
-    "compare": ("subzero.simulation.comparison", "compare"),
-    "diagnose": ("subzero.diagnosis.api", "diagnose"),
-    "draw": ("subzero.figures", "draw"),
-    "export": ("subzero.results.export", "export"),
-    "load_scenario": ("subzero.model", "load"),
-    "open_run": ("subzero.figures.accessor", "open_run"),
-    "plan_sweep": ("subzero.sweeps.plan", "plan_sweep"),
-    "read_log": ("subzero.logs.api", "read_log"),
-    "read_record": ("subzero.records.record", "read_record"),
-    "read_trials": ("subzero.diagnosis.read_trials", "read_trials"),
-    "simulate": ("subzero.simulation.run", "simulate"),
-    "simulate_many": ("subzero.simulation.run", "simulate_many"),
-    "sweep": ("subzero.sweeps.api", "sweep"),
-    "warnings_of": ("subzero.validity", "warnings_of"),
+_NAMES = {
+    "subzero.calibration.api": "calibrate",
+    "subzero.channels": "CHANNELS Observation",
+    "subzero.diagnosis.api": "diagnose",
+    "subzero.diagnosis.hypothesis.logged": "Logged",
+    "subzero.diagnosis.read_trials": "read_trials",
+    "subzero.errors": "UserError",
+    "subzero.figures": "draw",
+    "subzero.figures.accessor": "open_run",
+    "subzero.logs.api": "read_log",
+    "subzero.model": "Model",
+    "subzero.records.record": "Record read_record",
+    "subzero.results.export": "export",
+    "subzero.simulation.checkpoint": "Checkpoint",
+    "subzero.simulation.comparison": "Comparison Refinement check compare",
+    "subzero.simulation.run": "simulate simulate_many",
+    "subzero.simulation.stepper": "RunStoppedError Simulator",
+    "subzero.sweeps.api": "sweep",
+    "subzero.sweeps.plan": "plan_sweep",
+    "subzero.synthetic.challenge": "challenge",
+    "subzero.validity": "RunWarning warnings_of",
 }
+"""Module → its public names."""
+
+_HOME = {name: (module, name) for module, names in _NAMES.items() for name in names.split()}
+_HOME["load_scenario"] = ("subzero.model", "load")
 """Public name → (module, name there)."""
 
 _PACKAGES = ("autopilot", "sweeps")
