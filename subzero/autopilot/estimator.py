@@ -11,14 +11,14 @@ cable is not in the filter's model: feed-forward cancels it, and the integral re
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, radians
+from math import radians
 
 import numpy as np
 
 from scenarios.heading import shortest
-from subzero.autopilot.design import Gains, Schedule, design_gains
+from subzero.autopilot.design import WEIGHTS, Gains, Schedule, design_gains
 from subzero.autopilot.linear import linearise, subsystem
-from subzero.autopilot.loops import refuse_unknown
+from subzero.autopilot.loops import Law, Loop
 from subzero.autopilot.tuning import Tuning
 from subzero.channels import Observation
 from subzero.steady_motion.trim import trim
@@ -26,8 +26,7 @@ from subzero.steady_motion.trim import trim
 STATES = ("sway_speed", "yaw_rate", "heading", "rudder_angle")
 TRACKED = ("yaw_rate", "heading")
 MEASURED = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
-LARGEST = {"yaw_rate": radians(20.0), "heading": radians(8.0), "integral": radians(16.0)}
-LARGEST_COMMAND = radians(10.0)
+LARGEST, LARGEST_COMMAND = WEIGHTS["heading"].largest, WEIGHTS["heading"].largest_command
 PROCESS_NOISE = np.diag([0.05, 0.05, 0.01, 0.02]) ** 2
 """Covariance of the process noise, per second: sway speed [m/s], yaw rate [rad/s], heading, rudder [rad]."""
 MEASUREMENT_NOISE = np.diag([radians(0.5), radians(0.5)]) ** 2
@@ -71,7 +70,7 @@ def estimates(
     """
     import control
 
-    weights = LARGEST | (largest or {})
+    weights = {**LARGEST, **(largest or {})}
     parts = []
     for speed in tuning.speeds:
         line = linearise(tuning.model, trim(tuning.model, speed=speed))
@@ -97,91 +96,43 @@ def estimates(
     )
 
 
-class EstimatorLoop:
-    """The LQG heading loop with its state; the interface is that of `loops.Loop`.
+class EstimatorLoop(Loop):
+    """The LQG heading loop with its state.
 
     Args:
         matrices: from `estimates`, for the same sample time.
         sample_time: of the controller. [s]
     """
 
+    measured = TRACKED
+
     def __init__(self, matrices: Estimates, sample_time: float) -> None:
-        self.matrices, self.sample_time = matrices, sample_time
-        self.reset()
+        self.matrices = matrices
+        law = Law(measured=STATES, gains=matrices.feedback, largest_error=LARGEST_ERROR)
+        super().__init__(law, sample_time)
 
-    def reset(self) -> None:
-        """Set the integral to 0, and drop the estimate."""
-        self.integral = 0.0
-        self.estimate: np.ndarray | None = None
-        self._wanted: float | None = None
+    def _begin(self, reading: Observation, command: float) -> None:
+        """Begin to estimate sway speed and rudder, the rudder at its command."""
+        self.estimate = np.array([0.0, reading.yaw_rate, reading.heading, command])
 
-    def engage(
-        self,
-        reading: Observation,
-        wanted: float,
-        speed: float,
-        feed_forward: float,
-        command: float,
-        rate: float = 0.0,
-    ) -> None:
-        """Set the integral so that the next command, before limits, is this one (bumpless transfer)."""
-        refuse_unknown(reading, TRACKED, wanted=wanted, command=command, feed_forward=feed_forward)
-        self.estimate = np.array([0.0, reading.yaw_rate, reading.heading, command - feed_forward])
-        self.integral = command - feed_forward - self._feedback(wanted, speed, rate)[0]
-        self._wanted = wanted
+    def _now(self, reading: Observation) -> float:
+        """Return the heading, as it is estimated."""
+        return float(self.estimate[2])
 
-    def update(
-        self,
-        reading: Observation,
-        wanted: float,
-        speed: float,
-        feed_forward: float = 0.0,
-        limits: tuple[float, float] = (-inf, inf),
-        integrate: bool = True,
-        rate: float = 0.0,
-    ) -> float:
-        """Return the rudder command for the next sample [rad]; arguments as of `loops.Loop.update`."""
-        refuse_unknown(reading, TRACKED, wanted=wanted, rate=rate, feed_forward=feed_forward)
-        if self.estimate is None:
-            self.estimate = np.array([0.0, reading.yaw_rate, reading.heading, 0.0])
-        self.integral -= self._jump(wanted, speed, rate)
-        feedback, growth = self._feedback(wanted, speed, rate)
-        low, high = limits
-        command = feed_forward + feedback + self.integral + growth
-        if not integrate or (command > high and growth > 0.0) or (command < low and growth < 0.0):
-            growth = 0.0
-        self.integral += growth
-        command = min(high, max(low, feed_forward + feedback + self.integral))
-        self._predict(reading, speed, command - feed_forward + float(self.matrices.turn.at(speed)[1]) * rate)
-        return command
-
-    def _feedback(self, wanted: float, speed: float, rate: float) -> tuple[float, float]:
+    def _feedback(
+        self, reading: Observation, wanted: float, speed: float, rate: float
+    ) -> tuple[float, float]:
         """Return −k·(x̂ − x_w), and the increment of the integral."""
-        assert self.estimate is not None
         *k, k_integral, _ = self.matrices.feedback.at(speed).tolist()
         sway, rudder = (self.matrices.turn.at(speed) * rate).tolist()
-        error = _limited(wanted - float(self.estimate[2]))
+        error = self._error(wanted, self._now(reading))
         off = self.estimate - np.array([sway, rate, self.estimate[2] + error, rudder])
         return -float(np.dot(k, off)), self.sample_time * k_integral * error
 
-    def _jump(self, wanted: float, speed: float, rate: float) -> float:
-        """Return the change of the integral at a jump of the set-point, as in `loops`."""
-        assert self.estimate is not None
-        before = wanted if self._wanted is None else self._wanted + rate * self.sample_time
-        self._wanted = wanted
-        k, b = self.matrices.feedback.at(speed)[[2, 5]].tolist()
-        now = float(self.estimate[2])
-        return float((1.0 - b) * k * (_limited(wanted - now) - _limited(before - now)))
-
-    def _predict(self, reading: Observation, speed: float, command: float) -> None:
+    def _go_on(self, reading: Observation, speed: float, command: float, rate: float) -> None:
         """Move the estimate on by a sample: prediction, and correction by the innovation."""
-        assert self.estimate is not None
+        command += float(self.matrices.turn.at(speed)[1]) * rate
         model, gain = self.matrices.model.at(speed), self.matrices.filter.at(speed)
         innovation = np.array([reading.yaw_rate, reading.heading]) - MEASURED @ self.estimate
         innovation[1] = shortest(float(innovation[1]))
         self.estimate = model[:, :4] @ self.estimate + model[:, 4] * command + gain @ innovation
-
-
-def _limited(error: float) -> float:
-    """Return an error by the shorter way, within ±`LARGEST_ERROR`. [rad]"""
-    return max(-LARGEST_ERROR, min(LARGEST_ERROR, shortest(error)))

@@ -76,6 +76,11 @@ class Loop:
         self.law, self.sample_time = law, sample_time
         self.reset()
 
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """Channels that a sensor has to measure, the tracked one last."""
+        return self.law.measured
+
     def reset(self) -> None:
         """Set the integral to 0."""
         self.integral = 0.0
@@ -91,7 +96,8 @@ class Loop:
         rate: float = 0.0,
     ) -> None:
         """Set the integral so that the next command, before limits, is this one (bumpless transfer)."""
-        refuse_unknown(reading, self.law.measured, wanted=wanted, command=command, feed_forward=feed_forward)
+        refuse_unknown(reading, self.measured, wanted=wanted, command=command, feed_forward=feed_forward)
+        self._begin(reading, command - feed_forward)
         feedback, _ = self._feedback(reading, wanted, speed, rate)
         self.integral = command - feed_forward - feedback
         self._wanted = wanted
@@ -110,7 +116,7 @@ class Loop:
 
         Args:
             reading: the measurements.
-            wanted: y_w, set-point of the tracked channel, which is the last of `Law.measured`.
+            wanted: y_w, set-point of the tracked channel, which is the last of `measured`.
             speed: at which the scheduled gains are taken. [m/s]
             feed_forward: δ_ff, added before the limits.
             limits: of the command; the integral does not wind up beyond them.
@@ -120,7 +126,9 @@ class Loop:
         Raises:
             UserError: an input is not a finite number.
         """
-        refuse_unknown(reading, self.law.measured, wanted=wanted, rate=rate, feed_forward=feed_forward)
+        refuse_unknown(reading, self.measured, wanted=wanted, rate=rate, feed_forward=feed_forward)
+        if self._wanted is None:
+            self._begin(reading, 0.0)
         self.integral -= self._jump(reading, wanted, speed, rate)
         feedback, growth = self._feedback(reading, wanted, speed, rate)
         low, high = limits
@@ -128,20 +136,32 @@ class Loop:
         if not integrate or (command > high and growth > 0.0) or (command < low and growth < 0.0):
             growth = 0.0
         self.integral += growth
-        return min(high, max(low, feed_forward + feedback + self.integral))
+        command = min(high, max(low, feed_forward + feedback + self.integral))
+        self._go_on(reading, speed, command - feed_forward, rate)
+        return command
+
+    def _begin(self, reading: Observation, command: float) -> None:
+        """Begin to estimate what is not measured, under a command; nothing here."""
+
+    def _go_on(self, reading: Observation, speed: float, command: float, rate: float) -> None:
+        """Go on with that by a sample."""
 
     def _jump(self, reading: Observation, wanted: float, speed: float, rate: float) -> float:
         """Return the change of the integral at a jump of the set-point, (1 − b) k_y Δ."""
         before = wanted if self._wanted is None else self._wanted + rate * self.sample_time
         self._wanted = wanted
-        *_, k, _, b = self.law.gains.at(speed).tolist()
-        measured = getattr(reading, self.law.measured[-1])
-        return float((1.0 - b) * k * (self._error(wanted, measured) - self._error(before, measured)))
+        gains, now = self.law.gains.at(speed).tolist(), self._now(reading)
+        k, b = gains[self.law.measured.index(self.measured[-1])], gains[-1]
+        return float((1.0 - b) * k * (self._error(wanted, now) - self._error(before, now)))
+
+    def _now(self, reading: Observation) -> float:
+        """Return the tracked channel, as it is measured."""
+        return float(getattr(reading, self.measured[-1]))
 
     def _error(self, wanted: float, measured: float) -> float:
         """Return how far it is to a set-point, within ±`largest_error`; of a heading by the shorter way."""
         apart = wanted - measured
-        error = shortest(apart) if self.law.measured[-1] == HEADING else apart
+        error = shortest(apart) if self.measured[-1] == HEADING else apart
         return max(-self.law.largest_error, min(self.law.largest_error, error))
 
     def _feedback(

@@ -11,7 +11,7 @@ difference (roll). The feedback gains are those of the bare hull. Only the feed-
 from __future__ import annotations
 
 from math import copysign, radians, sqrt
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,36 +52,6 @@ class Wanted(NamedTuple):
     turn_rate: float = 0.0
 
 
-class HeadingLoop(Protocol):
-    """The interface of a heading controller: `loops.Loop` and `estimator.EstimatorLoop` have it."""
-
-    def reset(self) -> None:
-        """Begin again."""
-
-    def engage(
-        self,
-        reading: Observation,
-        wanted: float,
-        speed: float,
-        feed_forward: float,
-        command: float,
-        rate: float = ...,
-    ) -> None:
-        """Take over from a command without a jump (bumpless transfer)."""
-
-    def update(
-        self,
-        reading: Observation,
-        wanted: float,
-        speed: float,
-        feed_forward: float = ...,
-        limits: tuple[float, float] = ...,
-        integrate: bool = ...,
-        rate: float = ...,
-    ) -> float:
-        """Return the command for the next sample."""
-
-
 class StandardAutopilot:
     """The four loops together, with a heading loop of choice.
 
@@ -99,7 +69,7 @@ class StandardAutopilot:
         sample_time: float = 0.1,
         *,
         cable: CableModel | None = None,
-        heading: HeadingLoop | None = None,
+        heading: Loop | None = None,
         name: str = "pid",
     ) -> None:
         self.tuning, self.sample_time, self.name = tuning, sample_time, name
@@ -113,7 +83,7 @@ class StandardAutopilot:
         self.speed_loop, self.pitch_loop, self.roll_loop = (
             Loop(laws[loop], sample_time) for loop in ("speed", "pitch", "roll")
         )
-        self.heading_loop: HeadingLoop = heading or Loop(laws["heading"], sample_time)
+        self.heading_loop = heading or Loop(laws["heading"], sample_time)
         hull = tuning.model.vehicle
         self._propeller = hull.propeller.numbers(hull.water.density)
         self._fastest = hull.motor.speed_per_volt * hull.battery.full_voltage
