@@ -29,7 +29,18 @@ import scenarios
 from subzero.cli import autopilot, cables, diagnosis, import_log, install, sweep, trials
 from subzero.cli.examples import EXAMPLES, register
 from subzero.cli.interrupts import INTERRUPTED, print_interrupted, reset, was_interrupted
-from subzero.cli.output_mode import COMMAND, NOT_STRICT, PLAIN, OutputMode, StrictOutputMode, set_output_mode
+from subzero.cli.output_mode import (
+    COMMAND,
+    FINE,
+    MISTAKE,
+    NOT_STRICT,
+    OUTPUT_MODE,
+    PLAIN,
+    STOPPED,
+    Flag,
+    OutputMode,
+    StrictOutputMode,
+)
 from subzero.errors import DISTRIBUTION, UserError, nearest, printable
 
 if TYPE_CHECKING:
@@ -40,9 +51,7 @@ if TYPE_CHECKING:
 
     Runs = dict[str, xr.Dataset]
 
-Flag = autopilot.Flag
 Export = Annotated[tuple[str, ...], Parameter(negative=())]
-FINE, MISTAKE, STOPPED = 0, 2, 3
 OPTION_LIKENESS = 0.6
 """An option that is less like an unknown one was not meant by it, on `difflib`'s scale from 0 to 1."""
 
@@ -70,7 +79,11 @@ class Outputs:
         """Raise an error for outputs that cannot be made, before anything is simulated."""
         from subzero.cli.write_results import check_pictures
 
-        _refuse_no_export(self.export)
+        if self.export:
+            from subzero.results.export import writer_of
+
+            for kind in self.export:
+                writer_of(kind)
         check_pictures(self.width, self.animate)
 
     def kinds(self) -> dict[str, Any]:
@@ -196,7 +209,7 @@ def simulate(
     scenario: str,
     /,
     *,
-    untethered: Annotated[bool, Parameter(negative=())] = False,
+    untethered: Flag = False,
     inputs: Inputs = NO_INPUTS,
     kept: Kept = ALL_KEPT,
     outputs: Outputs = USUAL_OUTPUTS,
@@ -342,7 +355,7 @@ def explore(
     /,
     *,
     port: int = 8642,
-    no_browser: Annotated[bool, Parameter(negative=())] = False,
+    no_browser: Flag = False,
     output_mode: OutputMode = PLAIN,
 ) -> int:
     """Open a page on this machine, with sliders that say at once what the trial would do otherwise.
@@ -413,7 +426,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 @contextmanager
 def _aloud(output_mode: OutputMode) -> Iterator[None]:
     """Set the output mode of a command; with --verbose, report the versions, and in the end how long it took."""
-    set_output_mode(output_mode)
+    OUTPUT_MODE.set(output_mode)
     began = perf_counter()
     if output_mode.verbose:
         import platform
@@ -422,7 +435,7 @@ def _aloud(output_mode: OutputMode) -> Iterator[None]:
     try:
         yield
     finally:
-        set_output_mode(PLAIN)
+        OUTPUT_MODE.set(PLAIN)
         if output_mode.verbose:
             print(f"{_effort()}{perf_counter() - began:.1f} s in all.", file=sys.stderr)
 
@@ -487,15 +500,6 @@ def _missing(command: str, argument: cyclopts.Argument) -> str:
     return (
         f"subzero {command} needs {argument.name.removeprefix('--').upper()}, as in: {EXAMPLES[command][0]}"
     )
-
-
-def _refuse_no_export(kinds: Sequence[str]) -> None:
-    """Raise an error for a kind of file that nothing here writes, before the run."""
-    if kinds:
-        from subzero.results.export import writer_of
-
-        for kind in kinds:
-            writer_of(kind)
 
 
 def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Runs:

@@ -6,14 +6,14 @@ import sys
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import cyclopts
 from cyclopts import Parameter
 
 import scenarios
 from subzero.cli.examples import register
-from subzero.cli.output_mode import NOT_STRICT, StrictOutputMode
+from subzero.cli.output_mode import FINE, NOT_STRICT, STOPPED, Flag, StrictOutputMode
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     Fly = Callable[[str, Progress], tuple[xr.Dataset, dict[str, float]]]
 
 RUNS = ("tethered", "untethered")
-FINE, STOPPED = 0, 3
-
-Flag = Annotated[bool, Parameter(negative=())]
 
 MANOEUVRE_COMMANDS = {
     "vertical_zigzag": ("pitch", "stern_plane_port_command"),

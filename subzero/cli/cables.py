@@ -9,9 +9,8 @@ from pathlib import Path
 import cyclopts
 
 from subzero.cli.examples import register
-from subzero.cli.output_mode import PLAIN, OutputMode
+from subzero.cli.output_mode import FINE, PLAIN, OutputMode
 
-FINE = 0
 LARGEST_DECK = 10_000_000
 """A larger file is no deck. [bytes]"""
 

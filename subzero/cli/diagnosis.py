@@ -15,7 +15,7 @@ from cyclopts import Parameter
 import scenarios
 from subzero.cli.examples import register
 from subzero.cli.interrupts import INTERRUPTED, patience, print_interrupted
-from subzero.cli.output_mode import PLAIN, OutputMode
+from subzero.cli.output_mode import FINE, PLAIN, STOPPED, Flag, OutputMode
 from subzero.cli.progress import progress_bar
 from subzero.errors import UserError, printable
 
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from subzero.diagnosis.results import Verdict
     from subzero.records.record import Record
 
-FINE, NO_CALIBRATION = 0, 3
 LAST_WORDS_S = 60.0
 """Time that an interrupted diagnosis has to print and write its partial results. [s]"""
 
@@ -38,7 +37,6 @@ COSTS = (
 )
 """Advice that is printed when a diagnosis stands still."""
 
-Flag = Annotated[bool, Parameter(negative=())]
 With = Annotated[Path | None, Parameter(name="--with")]
 Own = Annotated[Path | None, Parameter(name="--effects")]
 
@@ -173,7 +171,7 @@ def calibrate(
             found = run(logged, free=wanted, vehicle=vehicle, progress=progress, quick=estimation.quick)
         write_all(found, output_folder, out.stem)
     print_calibration(found, output_folder, out, output_mode=output_mode)
-    return NO_CALIBRATION if found.refused else FINE
+    return STOPPED if found.refused else FINE
 
 
 def challenge(

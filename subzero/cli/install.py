@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import cyclopts
 
 from subzero.cli.examples import register
-from subzero.cli.output_mode import PLAIN, OutputMode
+from subzero.cli.output_mode import FINE, PLAIN, STOPPED, OutputMode
 from subzero.errors import DISTRIBUTION, printable
 
 if TYPE_CHECKING:
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from subzero.simulation.run import Progress
 
-FINE, STOPPED = 0, 3
 Shell = Literal["bash", "zsh", "fish"]
 LIBRARIES = (
     "numpy",

@@ -14,6 +14,10 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+FINE, MISTAKE, STOPPED = 0, 2, 3
+"""Exit codes: all is well; the user has to change something; a run could not go on."""
+Flag = Annotated[bool, Parameter(negative=())]
+
 COMMAND: ContextVar[str] = ContextVar("COMMAND", default="")
 """The line of the shell that is being carried out; a page says it, so that its reader can do it again."""
 
@@ -60,18 +64,9 @@ class StrictOutputMode(OutputMode):
         strict: end with exit code 3 if a run ends with warnings.
     """
 
-    strict: Annotated[bool, Parameter(negative=())] = False
+    strict: Flag = False
 
 
 PLAIN, NOT_STRICT = OutputMode(), StrictOutputMode()
-_VOICE: ContextVar[OutputMode] = ContextVar("VOICE", default=PLAIN)
-
-
-def output_mode_of_command() -> OutputMode:
-    """Return the output mode of the command that is carried out."""
-    return _VOICE.get()
-
-
-def set_output_mode(output_mode: OutputMode) -> None:
-    """Set the output mode of the command that is carried out."""
-    _VOICE.set(output_mode)
+OUTPUT_MODE: ContextVar[OutputMode] = ContextVar("OUTPUT_MODE", default=PLAIN)
+"""That of the command that is carried out."""

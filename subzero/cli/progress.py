@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import cache
 from time import monotonic
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from subzero.cli.output_mode import output_mode_of_command
+from subzero.cli.output_mode import OUTPUT_MODE
 from subzero.errors import printable
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def progress_bar(words: str, costs: Callable[[], str] = str) -> ProgressBar:
 
     from subzero.jit.machine_code import before_compiling
 
-    console = Console(stderr=True, highlight=False, quiet=output_mode_of_command().quiet)
+    console = Console(stderr=True, highlight=False, quiet=OUTPUT_MODE.get().quiet)
     before_compiling(lambda: console.print(COMPILING))
     return ProgressBar(words, console, costs)
 
@@ -168,6 +169,7 @@ def _compiling() -> bool:
     return _compilations[0] > 0
 
 
+@cache
 def _listen() -> None:
     """Count the compilations of numba, from now on."""
     from numba.core import event
@@ -179,12 +181,7 @@ def _listen() -> None:
         def on_end(self, event: object) -> None:
             _compilations[0] -= 1
 
-    if not _listening:
-        _listening.append(Count())
-        event.register("numba:compile", _listening[0])
-
-
-_listening: list[object] = []
+    event.register("numba:compile", Count())
 
 
 def costs_of(trial: scenarios.Trial, tethered: bool = True) -> str:

@@ -7,22 +7,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from time import monotonic
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import cyclopts
-from cyclopts import Parameter
 
 from subzero.cli.examples import register
-from subzero.cli.output_mode import NOT_STRICT, StrictOutputMode
+from subzero.cli.output_mode import FINE, NOT_STRICT, STOPPED, Flag, StrictOutputMode
 from subzero.errors import UserError, missing_extra, printable, whole
 
 if TYPE_CHECKING:
     from subzero.files.atomic_output import OutputFolder
     from subzero.sweeps.api import SweepProgress
-
-FINE, STOPPED = 0, 3
-
-Flag = Annotated[bool, Parameter(negative=())]
 
 
 def sweep(

@@ -17,7 +17,7 @@ import scenarios
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.quantities import KNOWN
 from subzero.cli.examples import register
-from subzero.cli.output_mode import PLAIN, OutputMode
+from subzero.cli.output_mode import FINE, PLAIN, Flag, OutputMode
 from subzero.errors import UserError, printable, real, short
 
 if TYPE_CHECKING:
@@ -25,9 +25,7 @@ if TYPE_CHECKING:
 
     from scenarios.contents import Contents, Number
 
-Flag = Annotated[bool, Parameter(negative=())]
 Words = Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative=())]
-FINE = 0
 COMMANDS_COLUMN = "propeller_rps"
 """A CSV file with this column holds commands; any other is a measured record."""
 FEW_NUMBERS = """

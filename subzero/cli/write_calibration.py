@@ -5,13 +5,11 @@ the terminal.
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from rich import box
 from rich.console import Console
 from rich.table import Table
@@ -19,6 +17,7 @@ from rich.table import Table
 from subzero.calibration.results import REMEDY, Advice, Calibration, Estimate
 from subzero.cli.output_mode import PLAIN, OutputMode
 from subzero.errors import UserError, printable
+from subzero.results.summary import plain
 
 if TYPE_CHECKING:
     from subzero.files.atomic_output import OutputFolder
@@ -64,11 +63,6 @@ def print_calibration(
     found: Calibration, output_folder: OutputFolder, out: Path, *, output_mode: OutputMode = PLAIN
 ) -> None:
     """Print the numbers, the undetermined directions, and the paths of the files."""
-    with output_mode.emit(plain(mapping(found)) | output_folder.files()):
-        _print(found, output_folder, out, Console())
-
-
-def _print(found: Calibration, output_folder: OutputFolder, out: Path, console: Console) -> None:
     table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
     for name in ("number", "before", "calibrated", "95 %", "change"):
         words = name in ("number", "change")
@@ -77,12 +71,14 @@ def _print(found: Calibration, output_folder: OutputFolder, out: Path, console: 
         )
     for row in rows(found):
         table.add_row(*row)
-    console.print(table, highlight=False)
-    for line in (headline(found), *story(found)):
-        console.print(printable(line), highlight=False, markup=False)
-    console.print(output_folder.words(), highlight=False, markup=False)
-    if not found.refused:
-        console.print(f'Fly it: vehicle = "{out.name}" in a trial beside it.', highlight=False, markup=False)
+    lines = [printable(line) for line in (headline(found), *story(found))]
+    lines += [output_folder.words()]
+    lines += [] if found.refused else [f'Fly it: vehicle = "{out.name}" in a trial beside it.']
+    with output_mode.emit(plain(mapping(found)) | output_folder.files()):
+        console = Console()
+        console.print(table, highlight=False)
+        for line in lines:
+            console.print(line, highlight=False, markup=False)
 
 
 FORMAT = "subzero calibration 1"
@@ -209,16 +205,3 @@ def mapping(found: Calibration) -> dict[str, Any]:
         "notes": list(found.notes),
         "seconds": dict(found.seconds),
     }
-
-
-def plain(value: Any) -> Any:
-    """Return a value as JSON takes it: arrays as lists, numbers that do not exist as null."""
-    if isinstance(value, Mapping):
-        return {key: plain(each) for key, each in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, Sequence) and not isinstance(value, str):
-        return [plain(each) for each in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    return None if isinstance(value, float) and not math.isfinite(value) else value

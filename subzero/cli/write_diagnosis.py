@@ -7,7 +7,6 @@ and the measured vehicle are ghosts.
 from __future__ import annotations
 
 import dataclasses
-import io
 import json
 import shlex
 import shutil
@@ -44,7 +43,7 @@ from subzero.errors import DISTRIBUTION, printable
 from subzero.page.replay import HULL, Actor, as_run, encode
 from subzero.page.report import Answer, Line, Report, Section, render
 from subzero.page.report import Table as Rows
-from subzero.results.netcdf_csv import lacking_letters_as_boxes
+from subzero.results.netcdf_csv import write_figures
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -156,12 +155,8 @@ def _rich(table: tables.Table, width: int) -> Table:
 
 def _readable(name: str, cells: Sequence[str]) -> int:
     """Return how many letters a column needs to be read: its longest word, of sentences a few words a line."""
-    return max(_longest_word(name, cells), min(SENTENCE_LETTERS, max(map(len, (name, *cells)), default=1)))
-
-
-def _longest_word(name: str, cells: Sequence[str]) -> int:
-    """Return how many letters the longest word of a column has."""
-    return max((len(word) for cell in (name, *cells) for word in cell.split()), default=1)
+    longest_word = max((len(word) for cell in (name, *cells) for word in cell.split()), default=1)
+    return max(longest_word, min(SENTENCE_LETTERS, max(map(len, (name, *cells)))))
 
 
 def write_all(
@@ -215,8 +210,7 @@ def _draw(verdict: Verdict, logged: Sequence[Logged], output_folder: OutputFolde
     records = ", ".join(trial.name for trial in logged)
     title = f"Diagnosis of {records}: {words.headline(verdict)}"
     figures = draw_diagnosis(verdict, Title(words=title, scenario=names))
-    for name, figure in figures.items():
-        (output_folder.path / f"{name}.png").write_bytes(_png(figure))
+    write_figures(figures, output_folder)
     return figures
 
 
@@ -381,13 +375,6 @@ def _about(trial: Logged) -> dict[str, object]:
         "duration_s": float(trial.record.time[-1]),
         "notes": list(trial.notes),
     }
-
-
-def _png(figure: Figure) -> bytes:
-    held = io.BytesIO()
-    with lacking_letters_as_boxes():
-        figure.savefig(held, format="png", pil_kwargs={"compress_level": 3})
-    return held.getvalue()
 
 
 def _write(output_folder: OutputFolder, name: str, text: str) -> None:

@@ -5,7 +5,6 @@ The figure shows track, heading, speed and command, with the cable and without.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -55,7 +54,7 @@ def write(
         output_folder: where to.
     """
     from subzero.page import page_of_runs
-    from subzero.results.summary import summary_of
+    from subzero.results.summary import number, summary_of
 
     runs = {name: run for name, (run, _) in measured.items()}
     summary = summary_of(runs, None)
@@ -63,7 +62,7 @@ def write(
     output_folder.failed = any(run.attrs["outcome"] != "completed" for run in runs.values())
     for name, (run, indices) in measured.items():
         netcdf_csv.write_run(run, output_folder, name)
-        summary[name]["indices"] = {key: _number(value) for key, value in indices.items()}
+        summary[name]["indices"] = {key: number(value) for key, value in indices.items()}
     netcdf_csv.write_summary(summary, output_folder)
     figures = {"manoeuvre": picture(runs, title, answer, command)}
     netcdf_csv.write_figures(figures, output_folder)
@@ -95,11 +94,6 @@ def print_flights(
         for name in names
         if summary[name]["outcome"] == "stopped"
     ]
-
-
-def _number(value: float) -> float | None:
-    """Return a plain float that JSON can hold: None for a number that does not exist."""
-    return float(value) if math.isfinite(value) else None
 
 
 HEADLINES = {

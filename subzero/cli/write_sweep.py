@@ -6,7 +6,6 @@ The processes that ran the members draw the figures at the same time.
 from __future__ import annotations
 
 import io
-import math
 from collections.abc import Iterator, Sequence
 from concurrent.futures import BrokenExecutor
 from dataclasses import asdict, dataclass
@@ -21,6 +20,7 @@ from subzero.cli.output_mode import COMMAND, PLAIN, OutputMode
 from subzero.errors import printable
 from subzero.page.report import Drawn, drawn
 from subzero.results import netcdf_csv
+from subzero.results.summary import plain
 from subzero.sweeps.design import Points
 from subzero.sweeps.member import Job
 from subzero.sweeps.outcomes import unit_of
@@ -145,15 +145,8 @@ def summary_of(plan: Plan, store: Store, found: Gathered, effects: list[Effect])
         },
         "sensitivity": {
             "method": description_of(points.design)[0],
-            "effects": [_plain(effect) for effect in effects],
+            "effects": [plain(asdict(effect)) for effect in effects],
         },
-    }
-
-
-def _plain(effect: Effect) -> dict[str, Any]:
-    return {
-        key: None if isinstance(each, float) and not math.isfinite(each) else each
-        for key, each in asdict(effect).items()
     }
 
 
@@ -168,21 +161,18 @@ def print_sweep(
     summary: dict[str, Any], output_folder: OutputFolder, output_mode: OutputMode = PLAIN
 ) -> None:
     """Print the outcomes of a sweep."""
-    with output_mode.emit(summary | output_folder.files()):
-        _print(summary, output_folder, Console())
-
-
-def _print(summary: dict[str, Any], output_folder: OutputFolder, console: Console) -> None:
-    console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)
-    console.print(_rich(numbers(summary), words=1), highlight=False)
-    if summary["sensitivity"]["effects"]:
-        matters = what_matters(summary)
-        console.print(matters.title, highlight=False, markup=False)
-        console.print(_rich(matters, words=2), highlight=False)
-    for line in _troubles(summary):
-        console.print(printable(line), highlight=False, markup=False, soft_wrap=True)
     kept = f"{FILE} keeps its members: the same command does not run them again."
-    console.print(f"{output_folder.words()}\n{kept}", highlight=False, markup=False)
+    with output_mode.emit(summary | output_folder.files()):
+        console = Console()
+        console.print(f"{summary['scenario']}: {summary['title']}", highlight=False, markup=False)
+        console.print(_rich(numbers(summary), words=1), highlight=False)
+        if summary["sensitivity"]["effects"]:
+            matters = what_matters(summary)
+            console.print(matters.title, highlight=False, markup=False)
+            console.print(_rich(matters, words=2), highlight=False)
+        for line in _troubles(summary):
+            console.print(printable(line), highlight=False, markup=False, soft_wrap=True)
+        console.print(f"{output_folder.words()}\n{kept}", highlight=False, markup=False)
 
 
 def _rich(rows: Rows, *, words: int) -> Table:

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from subzero.channels import BY_NAME, ENERGY_CHANNELS, AnyRun, channels_of
-from subzero.records.record import Fit, fits
+from subzero.records.record import fits
 from subzero.validity import notes_of, warnings_of
 
 if TYPE_CHECKING:
@@ -112,16 +113,25 @@ def summary_of(runs: dict[str, xr.Dataset], record: Record | None) -> dict[str, 
     return {**head, "prescribed": bool(first.attrs["prescribed"]), **body, "measured": measured}
 
 
+def plain(value: Any) -> Any:
+    """Return a value as JSON takes it: arrays as lists, numbers that do not exist as null."""
+    if isinstance(value, Mapping):
+        return {key: plain(each) for key, each in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [plain(each) for each in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
 def _explained(runs: dict[str, xr.Dataset], record: Record) -> dict[str, Any]:
     """Return channel → its unit and, by run, the numbers of the fit."""
     return {
-        name: {"unit": BY_NAME[name].unit, **{label: _plain(each) for label, each in by_run.items()}}
+        name: {"unit": BY_NAME[name].unit, **{label: plain(asdict(fit)) for label, fit in by_run.items()}}
         for name, by_run in fits(runs, record).items()
     }
-
-
-def _plain(fit: Fit) -> dict[str, float | int | None]:
-    return {key: value if isinstance(value, int) else number(value) for key, value in asdict(fit).items()}
 
 
 def energy_balance(run: AnyRun) -> dict[str, float | None] | None:
