@@ -37,8 +37,7 @@ from subzero.diagnosis.hypothesis.configuration import Setting
 from subzero.diagnosis.hypothesis.logged import Logged
 from subzero.diagnosis.read_trials import read_trials
 from subzero.diagnosis.vehicle_model import vehicle_model
-from subzero.logs.api import import_log, to_csv
-from subzero.logs.trial_file import trial_of
+from subzero.logs.api import import_log, to_csv, trial_of
 from subzero.model import Model
 from subzero.records.record import Record
 from vehicle import from_mapping, to_mapping

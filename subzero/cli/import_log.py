@@ -13,13 +13,12 @@ import cyclopts
 from cyclopts import Parameter
 
 from subzero.cli.examples import register
-from subzero.cli.output_mode import PLAIN, OutputMode
+from subzero.cli.output_mode import FINE, PLAIN, Flag, OutputMode
 from subzero.errors import UserError, printable
 
 if TYPE_CHECKING:
     from subzero.logs.api import Imported
 
-FINE = 0
 LARGE = 20_000_000
 """A log of more has a progress bar. [byte]"""
 HEADINGS = ("column", "channel", "unit", "factor", "why")
@@ -32,7 +31,7 @@ def import_(
     map: Path | None = None,
     out: Path = Path("record.csv"),
     map_out: Path | None = None,
-    merge: Annotated[bool, Parameter(negative=())] = False,
+    merge: Flag = False,
     trial: Path | None = None,
     output_mode: OutputMode = PLAIN,
 ) -> int:
@@ -76,7 +75,7 @@ def import_(
 def _write_trial(path: Path, found: Imported, record: Path) -> None:
     """Make the trial of a record that was written."""
     from subzero.files.read_file import make_toml
-    from subzero.logs.trial_file import trial_of
+    from subzero.logs.api import trial_of
 
     assert found.record is not None
     make_toml(path, trial_of(found.record, Path(os.path.relpath(record, path.parent)).as_posix()))
