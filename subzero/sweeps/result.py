@@ -112,12 +112,8 @@ def open_result(path: Path) -> xr.Dataset:
     """Return the dataset of a sweep, read from its file as far as it is looked at."""
     import xarray as xr
 
-    return xr.open_dataset(path, engine="netcdf4").set_coords(json.loads(_attribute(path, "parameters")))
-
-
-def _attribute(path: Path, name: str) -> str:
-    with netCDF4.Dataset(path) as file:
-        return str(file.getncattr(name))
+    runs = xr.open_dataset(path, engine="netcdf4")
+    return runs.set_coords(json.loads(runs.attrs["parameters"]))
 
 
 def _own_names(store: Store, job: Job) -> tuple[str, ...]:
