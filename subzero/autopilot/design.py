@@ -272,6 +272,14 @@ class Weights:
     foreseen: bool = False
 
 
+def _of_angle(part: str, angle: str, rate: str, fastest: float, largest_command: float) -> Weights:
+    """Return the weights of a loop that holds an angle, with its largest rate and command. [degree/s, degree]"""
+    largest = {rate: radians(fastest), angle: radians(8.0), INTEGRAL: radians(16.0)}
+    return Weights(
+        part=part, measured=(rate, angle), largest=largest, largest_command=radians(largest_command)
+    )
+
+
 WEIGHTS: dict[str, Weights] = {
     "speed": Weights(
         part="surge",
@@ -280,24 +288,9 @@ WEIGHTS: dict[str, Weights] = {
         largest_command=4.0,
         foreseen=True,
     ),
-    "heading": Weights(
-        part="yaw_sway",
-        measured=("yaw_rate", "heading"),
-        largest={"yaw_rate": radians(20.0), "heading": radians(8.0), "integral": radians(16.0)},
-        largest_command=radians(10.0),
-    ),
-    "pitch": Weights(
-        part="pitch_heave",
-        measured=("pitch_rate", "pitch"),
-        largest={"pitch_rate": radians(20.0), "pitch": radians(8.0), "integral": radians(16.0)},
-        largest_command=radians(10.0),
-    ),
-    "roll": Weights(
-        part="roll",
-        measured=("roll_rate", "roll"),
-        largest={"roll_rate": radians(60.0), "roll": radians(8.0), "integral": radians(16.0)},
-        largest_command=radians(6.0),
-    ),
+    "heading": _of_angle("yaw_sway", "heading", "yaw_rate", 20.0, 10.0),
+    "pitch": _of_angle("pitch_heave", "pitch", "pitch_rate", 20.0, 10.0),
+    "roll": _of_angle("roll", "roll", "roll_rate", 60.0, 6.0),
 }
 """Loop → its weights."""
 

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from subzero.autopilot.cable_modes import BENDS, CableModes
-from subzero.errors import UserError, suggestion
+from subzero.errors import UserError, chosen
 from subzero.model import Model
 from subzero.steady_motion.hull_state_space import (
     STATE_NAMES,
@@ -119,15 +119,8 @@ def cable_states() -> list[str]:
     """Return the names of the cable's states: its length [m]; bearing and dip of the tow point as seen from the drum,
     against the way [rad]; bends of the cable in both directions [rad] and their rates [rad/s].
     """
-    sideways = [
-        [
-            way,
-            *(f"{way}_bend_{k + 1}" for k in range(BENDS)),
-            *(f"{way}_bend_rate_{k + 1}" for k in range(BENDS)),
-        ]
-        for way in ("cable_bearing", "cable_dip")
-    ]
-    return ["cable_length", *sideways[0], *sideways[1]]
+    bends = [f"_{kind}_{k + 1}" for kind in ("bend", "bend_rate") for k in range(BENDS)]
+    return ["cable_length", *(way + end for way in ("cable_bearing", "cable_dip") for end in ("", *bends))]
 
 
 def _check_straight(model: Model, steady: Trim) -> None:
@@ -229,10 +222,7 @@ def subsystem(linear: control.StateSpace, name: str) -> control.StateSpace:
     """
     import control
 
-    if name not in SUBSYSTEMS:
-        allowed = ", ".join(SUBSYSTEMS)
-        raise UserError(f"There is no subsystem '{name}'.{suggestion(name, SUBSYSTEMS)} Allowed: {allowed}.")
-    part = SUBSYSTEMS[name]
+    part = chosen(SUBSYSTEMS, name, "subsystem")
     labels = tuple(linear.state_labels)
     own = (*part.states, *(label for label in labels if part.cable and label.startswith(part.cable)))
     to_x = _rows(labels, "stern_plane_port_angle", ("stern_planes_angle", "stern_planes_difference"))

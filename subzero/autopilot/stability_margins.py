@@ -19,7 +19,7 @@ from subzero.autopilot.design import WEIGHTS
 from subzero.autopilot.estimator import MEASURED, STATES, Estimates
 from subzero.autopilot.linear import linearise, subsystem
 from subzero.autopilot.tuning import Tuning
-from subzero.errors import UserError, suggestion
+from subzero.errors import UserError, chosen
 from subzero.files.text_repr import Overview
 from subzero.model import Model
 from subzero.steady_motion.trim import trim
@@ -125,10 +125,7 @@ def sampled_loop(
         NoTrimError: the vehicle cannot pull that cable at that speed.
         UserError: there is no such loop.
     """
-    if loop not in WEIGHTS:
-        raise UserError(
-            f"There is no loop '{loop}'.{suggestion(loop, WEIGHTS)} Allowed: {', '.join(WEIGHTS)}."
-        )
+    chosen(WEIGHTS, loop, "loop")
     model = model or tuning.model
     linear = linearise(model, trim(model, speed=speed, wet_length=wet_length))
     return _opened(tuning, loop, linear, speed, sample_time, estimates)
