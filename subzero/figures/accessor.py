@@ -232,8 +232,7 @@ class RunPlots:
 
         if self._run.attrs["prescribed"]:
             return figure_5(self._run, self._title())
-        label = "tethered" if self._run.attrs["tethered"] else "untethered"
-        return figure_6({label: self._run}, None, self._title())
+        return figure_6(self._by_label(), None, self._title())
 
     def forces(self) -> Figure:
         """Return the figure of all forces on the vehicle, term by term, and of the propeller's work."""
@@ -245,8 +244,7 @@ class RunPlots:
         """Return the figure of attitude, depth and actuators."""
         from subzero.figures import attitude
 
-        label = "tethered" if self._run.attrs["tethered"] else "untethered"
-        return attitude({label: self._run}, None, self._title())
+        return attitude(self._by_label(), None, self._title())
 
     def cable(self) -> Figure:
         """Return the cable from above and from the side, and the tension along it, at five times."""
@@ -264,12 +262,14 @@ class RunPlots:
         from subzero.figures.style import channel_panel, headline, sheet, time_label
 
         channel = chosen({row.name: row for row in channels_of(self._run)}, name, "channel")
-        label = "tethered" if self._run.attrs["tethered"] else "untethered"
         figure, panels = sheet(1, 1, self._title())
-        channel_panel(panels[0], {label: self._run}, name)
+        channel_panel(panels[0], self._by_label(), name)
         headline(panels[0], channel.long_name)
         time_label(panels, 1)
         return figure
+
+    def _by_label(self) -> dict[str, xr.Dataset]:
+        return {"tethered" if self._run.attrs["tethered"] else "untethered": self._run}
 
     def _title(self) -> Title:
         from subzero.figures.style import Title, warnings_in_short

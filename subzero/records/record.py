@@ -164,8 +164,16 @@ def as_measured(record: Record) -> Record:
 
 
 def measured_alone(record: Record) -> Record:
-    """Return a record without the values that a logger filled in between measurements."""
-    values, intervals = _measurements_alone(record.time, record.values)
+    """Return a record without the values that a logger filled in between measurements: gaps in their place."""
+    values, intervals = dict(record.values), dict[str, float]()
+    for name, column in record.values.items():
+        known = np.flatnonzero(np.isfinite(column))
+        sampling = _sampling_of(column[known])
+        if sampling is not None:
+            kept = known[sampling]
+            values[name] = np.full(column.size, np.nan)
+            values[name][kept] = column[kept]
+            intervals[name] = float(np.median(np.diff(record.time[kept])))
     if not intervals:
         return record
     words = ", ".join(f"{BY_NAME[name].column} (every {every:.3g} s)" for name, every in intervals.items())
@@ -185,29 +193,6 @@ def _sampling_of(values: np.ndarray) -> slice | None:
         if every > 1 and rows.size >= max(FEWEST_MEASURED, NEW_SHARE * values.size / every):
             return slice(rows[0] % every, None, every)
     return None
-
-
-def _measurements_alone(
-    time: np.ndarray, values: Mapping[str, np.ndarray]
-) -> tuple[dict[str, np.ndarray], dict[str, float]]:
-    """Return the channels (n,) with gaps in place of what was not measured, and the time between two measurements of
-    those that have such gaps. [s]
-
-    Args:
-        time: of the rows (n,). [s]
-        values: channel → values, NaN in gaps (n,).
-    """
-    found, intervals = dict(values), dict[str, float]()
-    for name, column in values.items():
-        known = np.flatnonzero(np.isfinite(column))
-        sampling = _sampling_of(column[known])
-        if sampling is None:
-            continue
-        kept = known[sampling]
-        found[name] = np.full(column.size, np.nan)
-        found[name][kept] = column[kept]
-        intervals[name] = float(np.median(np.diff(time[kept])))
-    return found, intervals
 
 
 def _name(path: str | Path) -> str:

@@ -6,7 +6,7 @@ import csv
 import json
 import warnings
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
@@ -57,15 +57,13 @@ DIAGNOSIS_FILES = (
 """Files of diagnoses and challenges."""
 
 
-@contextmanager
-def open_output_folder(folder: Path) -> Iterator[OutputFolder]:
+def open_output_folder(folder: Path) -> AbstractContextManager[OutputFolder]:
     """Give a folder to write to, as `atomic_output.open_output_folder`; files of commands must not be folders there.
 
     Raises:
         UserError: at once, if `folder` cannot be made or written.
     """
-    with atomic_output.open_output_folder(folder, (*RUN_FILES, *DIAGNOSIS_FILES)) as output_folder:
-        yield output_folder
+    return atomic_output.open_output_folder(folder, (*RUN_FILES, *DIAGNOSIS_FILES))
 
 
 def write_run(run: xr.Dataset, output_folder: OutputFolder, name: str, *, float64: bool = False) -> None:

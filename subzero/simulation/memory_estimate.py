@@ -107,10 +107,7 @@ def bytes_of_results(trial: scenarios.Trial, model: Model, tethered: bool, rows:
     """Return an estimate of the memory that so many results of a run take."""
     if not tethered:
         return rows * bytes_a_row()
-    longest = max(
-        segments_of(trial, length) for length in (trial.start.wet_length, _last_length(trial, model))
-    )
-    return rows * (bytes_a_row() + BYTES_A_NODE * (1 + longest))
+    return rows * (bytes_a_row() + BYTES_A_NODE * (1 + most_segments(trial, model)))
 
 
 def refuse_what_cannot_fit(trial: scenarios.Trial, model: Model, tethered: bool, grid: Grid) -> None:
