@@ -76,6 +76,10 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         tethered: with the cable.
         sample_time: of an action. [s]
         render_mode: "rgb_array" for `render`.
+
+    Attributes:
+        simulator: the simulation.
+        wanted: the heading to turn to. [rad]
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012  # as Gymnasium declares it
@@ -90,15 +94,15 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         sample_time: float | None = None,
         render_mode: str | None = None,
     ) -> None:
-        self._sim = Simulator(load(scenario), tethered=tethered, sample_time=sample_time)
+        self.simulator = Simulator(load(scenario), tethered=tethered, sample_time=sample_time)
         self.render_mode = render_mode
-        self.metadata = self.metadata | {"render_fps": round(1.0 / self._sim.sample_time)}
+        self.metadata = self.metadata | {"render_fps": round(1.0 / self.simulator.sample_time)}
         self._propeller = float(propeller_rps)
-        self._most = float(self._sim.model.vehicle.rudder_servo.deflection_limit)
+        self._most = float(self.simulator.model.vehicle.rudder_servo.deflection_limit)
         low, high = np.array(list(LIMITS.values()), dtype=np.float32).T
         self.observation_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,), dtype=np.float32)
-        self._wanted, self._taken = 0.0, 0
+        self.wanted, self._taken = 0.0, 0
 
     @checked_arguments
     def reset(
@@ -108,7 +112,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         super().reset(seed=None if seed is None else whole("TetheredHeading.reset: seed", seed))
         drawn = self.np_random.uniform(-LARGEST_TURN, LARGEST_TURN)
         turn = checked("TetheredHeading.reset", "turn", (options or {}).get("turn", drawn), unit="rad")
-        self._wanted = self._sim.reset().heading + turn
+        self.wanted = self.simulator.reset().heading + turn
         self._taken = 0
         return self._observed(), self._info()
 
@@ -125,18 +129,16 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         from subzero.figures import style
         from subzero.figures.cable import in_scale
 
-        run = self._sim.result()
-        words = f"Heading {degrees(self.seen.heading):.0f}°, wanted {degrees(self._wanted):.0f}°"
-        figure, (axes,) = style.sheet(1, 1, style.Title(words=words, scenario=self._sim.trial.name))
+        run = self.simulator.result()
+        words = f"Heading {degrees(self.seen.heading):.0f}°, wanted {degrees(self.wanted):.0f}°"
+        figure, (axes,) = style.sheet(1, 1, style.Title(words=words, scenario=self.simulator.trial.name))
         way = run[["east", "north"]].to_array().values.T
         if run.attrs["tethered"]:
             way, cable = run["cable_position"].values[:, 0, 1::-1], run["cable_position"].values[-1]
             axes.plot(cable[:, 1], cable[:, 0], color=style.BLUE, label="cable")
         axes.plot(*way.T, color=style.GREY, linestyle=":", label="way of the tow point")
         axes.plot(*way[-1], "o", color=style.INK, label="tow point")
-        axes.quiver(
-            *way[-1], sin(self._wanted), cos(self._wanted), color=style.ORANGE, label="wanted heading"
-        )
+        axes.quiver(*way[-1], sin(self.wanted), cos(self.wanted), color=style.ORANGE, label="wanted heading")
         style.label(axes, "east [m]", "north [m]")
         in_scale(axes)
         style.legend(axes)
@@ -147,7 +149,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
     def hold(self, share: float) -> bool:
         """Hold the rudder at a share of its limit for one sample time; return whether the simulation stopped."""
         try:
-            self._sim.hold(*self.order(np.array([share]))[0].tolist())
+            self.simulator.hold(*self.order(np.array([share]))[0].tolist())
             stopped = False
         except RunStoppedError:
             stopped = True
@@ -166,7 +168,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def reward(self, error: float, share: float) -> float:
         """Return the reward of a sample time: heading error at its end [rad], rudder as a share of its limit."""
-        return -(error**2 + RUDDER_PRICE * share**2) * self._sim.sample_time
+        return -(error**2 + RUDDER_PRICE * share**2) * self.simulator.sample_time
 
     @property
     def is_over(self) -> bool:
@@ -174,34 +176,24 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         return self._taken >= STEPS
 
     @property
-    def simulator(self) -> Simulator:
-        """The simulation."""
-        return self._sim
-
-    @property
     def seen(self) -> Observation:
         """The true values now."""
-        return self._sim.observation
-
-    @property
-    def wanted(self) -> float:
-        """The heading to turn to. [rad]"""
-        return self._wanted
+        return self.simulator.observation
 
     @property
     def _error(self) -> float:
         """How far the heading is from the wanted one. [rad]"""
-        return self._wanted - float(self._sim.seen[HEADING])
+        return self.wanted - float(self.simulator.seen[HEADING])
 
     def _observed(self) -> np.ndarray:
         """Return the observation of the agent, within the limits of its space."""
         space: Any = self.observation_space
-        felt = sin(self._error), cos(self._error), *self._sim.seen[FELT].tolist()
+        felt = sin(self._error), cos(self._error), *self.simulator.seen[FELT].tolist()
         return np.clip(np.array(felt, dtype=np.float32), space.low, space.high)
 
     def _info(self) -> dict[str, Any]:
         """Return the whole truth, by name, and the heading that is wanted [rad]."""
-        return dict(zip(TRUTH, (self._wanted, *self._sim.seen.tolist()), strict=True))
+        return dict(zip(TRUTH, (self.wanted, *self.simulator.seen.tolist()), strict=True))
 
 
 def _shares(actions: Any, count: int) -> list[float]:

@@ -17,7 +17,7 @@ from subzero.autopilot.standard import Wanted
 from subzero.channels import DEGREE, HEADING, Observation
 from subzero.errors import BadValueError, UserError, short
 from subzero.model import Model
-from subzero.simulation.run import Progress
+from subzero.simulation.refinement import Progress
 from subzero.simulation.stepper import COMMANDED, CommandError, RunStoppedError, Simulator
 
 if TYPE_CHECKING:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import radians
-from typing import Protocol
 
 import numpy as np
 
@@ -23,19 +22,6 @@ HARD_OVER, SHARE_OF_HARD_OVER = radians(35.0), 0.5
 """A rudder hard over, and the share of the largest moment that it stands for. [rad, 1]"""
 
 
-class Helm(Protocol):
-    """The command of a vehicle for a rudder and stern-planes."""
-
-    @property
-    def straight(self) -> tuple[float, ...]:
-        """Command of the straight run."""
-
-    def command(
-        self, *, rudder: float | None = None, planes: float = 0.0, propulsion: float = 1.0
-    ) -> tuple[float, ...]:
-        """Return the command with a rudder [rad], both stern-planes moved [rad], the propulsion times a factor."""
-
-
 @dataclass(frozen=True)
 class FinHelm:
     """Propeller, rudder and stern-planes, as they are."""
@@ -45,7 +31,9 @@ class FinHelm:
     def command(
         self, *, rudder: float | None = None, planes: float = 0.0, propulsion: float = 1.0
     ) -> tuple[float, ...]:
-        """Return the straight command with some of it changed."""
+        """Return the straight command with a rudder [rad], both stern-planes moved [rad], the propulsion times a
+        factor.
+        """
         n, own, port, starboard, *listed = self.straight
         return propulsion * n, own if rudder is None else rudder, port + planes, starboard + planes, *listed
 
@@ -112,6 +100,10 @@ class ThrusterHelm:
         made = np.array([_thrusts(row, self.table) @ self.arms[:, at] for row in commands])
         off = (made - self.wrench[at]) / self.moment(axis, 1.0)
         return np.where(np.abs(off) < LITTLE, 0.0, off)
+
+
+Helm = FinHelm | ThrusterHelm
+"""The command of a vehicle for a rudder and stern-planes."""
 
 
 def _thrusts(shares: np.ndarray, table: np.ndarray) -> np.ndarray:

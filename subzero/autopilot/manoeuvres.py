@@ -24,7 +24,7 @@ from subzero.autopilot.standard import Wanted
 from subzero.channels import Observation
 from subzero.errors import UserError, checked, chosen
 from subzero.model import Model, load, model_of
-from subzero.simulation.run import Progress
+from subzero.simulation.refinement import Progress
 from subzero.steady_motion.asked import NoTrimError
 from subzero.steady_motion.hull_state_space import INPUT_NAMES
 from subzero.steady_motion.thruster_motion import is_on_thrusters, unheld
@@ -100,21 +100,19 @@ class TurningCircle(Program):
 class ZigZag(Program):
     """The rudder reversed each time the heading has changed by as much as the rudder."""
 
+    fin, angle = "rudder", "heading"
+
     def after(self, now: Observation, started: Observation) -> Command:
-        """Return the rudder on its present side."""
-        if self.turned("heading", now, started) >= abs(self.size):
+        """Return the fin on its present side."""
+        if self.turned(self.angle, now, started) >= abs(self.size):
             self.side = -self.side
-        return self.helm.command(rudder=self.side * self.size)
+        return self.helm.command(**{self.fin: self.side * self.size})
 
 
-class VerticalZigZag(Program):
+class VerticalZigZag(ZigZag):
     """The planes reversed each time the pitch has changed by as much as the planes."""
 
-    def after(self, now: Observation, started: Observation) -> Command:
-        """Return the planes on their present side."""
-        if self.turned("pitch", now, started) >= abs(self.size):
-            self.side = -self.side
-        return self.helm.command(planes=self.side * self.size)
+    fin, angle = "planes", "pitch"
 
 
 TO_THE_OTHER_SIDE = (1.0, 0.5, 0.25, 0.1, 0.0, -0.1, -0.25, -0.5, -1.0)

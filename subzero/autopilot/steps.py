@@ -15,7 +15,7 @@ from subzero.autopilot.standard import Wanted
 from subzero.autopilot.tuning import Tuning
 from subzero.errors import UserError, checked, chosen, real, short
 from subzero.model import Model, load
-from subzero.simulation.run import Progress
+from subzero.simulation.refinement import Progress
 from subzero.steady_motion.trim import trim
 
 if TYPE_CHECKING:

@@ -38,11 +38,10 @@ from subzero.files.read_file import make_toml
 if TYPE_CHECKING:
     import xarray as xr
 
+    from subzero.simulation.refinement import Progress
+
 Values = Mapping[str, float]
 """Name of a slider → where it stands, in its unit; those that are left out stand where the trial has them."""
-
-Progress = Callable[[float], None]
-"""Called with the fraction that is done."""
 
 ATTEMPT_S = 0.2
 """An answer is there within a second: so long for an attempt, as long to repeat it as far as it came, and the rest.
@@ -454,7 +453,7 @@ class Newest(Generic[Request, Found]):
 
     def __init__(
         self,
-        work: Callable[[Request, Callable[[float], None]], Found],
+        work: Callable[[Request, Progress], Found],
         done: Callable[[Found], None],
         failed: Callable[[Exception], None] = lambda error: None,
     ) -> None:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,7 +29,7 @@ from subzero.model import Model, load, model_of
 from subzero.records.record import Fit, Record, fits, measured_alone, modelled, read_record, with_heading_of
 from subzero.results.summary import FORCE, MOMENT, summarise, summary_of
 from subzero.simulation.memory_estimate import THINNED, thinning_notice, with_fewer_results
-from subzero.simulation.refinement import part_of
+from subzero.simulation.refinement import Progress, part_of
 from subzero.simulation.run import simulate
 from subzero.validity import RunWarning, as_json, warnings_of
 
@@ -46,9 +45,6 @@ SHOWN = {
     "largest_cable_force_N": "N",
 }
 """Key of a summary that is shown of both runs → its unit."""
-
-Progress = Callable[[float], None]
-"""Called now and then with the fraction that is done, 0 to 1."""
 
 
 @shown

@@ -70,6 +70,7 @@ SMALLEST_FORCE = 1e-6
 """Forces are compared with at least this: smaller ones have no meaning. [N]"""
 
 Progress = Callable[[float], None]
+"""Called now and then with the fraction that is done, 0 to 1."""
 Take = Callable[[scenarios.Trial, Grid, Progress | None], "Run"]
 """(trial, its times and the rows to keep, progress) → a run."""
 

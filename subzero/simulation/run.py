@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib.metadata import version
@@ -47,16 +47,13 @@ from subzero.simulation.memory_estimate import (
     with_fewer_results,
 )
 from subzero.simulation.provenance import code_digest, digest_of, processor, trial_digest
-from subzero.simulation.refinement import Accuracy, Budget, Take, prove, run_converged
+from subzero.simulation.refinement import Accuracy, Budget, Progress, Take, prove, run_converged
 from subzero.validity import refinement_that_settles
 
 if TYPE_CHECKING:
     import xarray as xr
 
     from subzero.simulation.checkpoint import Checkpoint, Keeper
-
-Progress = Callable[[float], None]
-"""Called now and then with the fraction that is done, 0 to 1."""
 
 
 @checked_arguments
