@@ -26,8 +26,7 @@ import cyclopts
 from cyclopts import Parameter
 
 import scenarios
-from subzero.cli import autopilot, cables, diagnosis, import_log, install, sweep, trials
-from subzero.cli.examples import EXAMPLES, register
+from subzero.cli import EXAMPLES, autopilot, cables, diagnosis, import_log, install, sweep, trials
 from subzero.cli.interrupts import INTERRUPTED, print_interrupted, reset, was_interrupted
 from subzero.cli.output_mode import (
     COMMAND,
@@ -85,10 +84,6 @@ class Outputs:
             for kind in self.export:
                 writer_of(kind)
         check_pictures(self.width, self.animate)
-
-    def kinds(self) -> dict[str, Any]:
-        """Return the outputs that `subzero.cli.write_results.write_all` makes."""
-        return {"width": self.width, "kind": self.figures, "exports": self.export}
 
 
 @Parameter(name="*")
@@ -291,13 +286,9 @@ def _deliver(
         with _progress(trial) as progress:
             runs, record = run(trial, **extended, **checkpoint, progress=progress)
         runs = _refined(runs, trial, extended) if outputs.check else runs
-        summary = write_results.write_all(
-            runs, record, output_folder, **outputs.kinds(), float64=kept.float64
-        )
+        summary = write_results.write_all(runs, record, output_folder, outputs, float64=kept.float64)
         write_results.write_film(outputs.animate, output_folder)
-    is_well = write_results.print_results(
-        summary, output_folder, strict=output_mode.strict, output_mode=output_mode
-    )
+    is_well = write_results.print_results(summary, output_folder, output_mode)
     return FINE if is_well else STOPPED
 
 
@@ -387,11 +378,42 @@ def explore(
     return FINE
 
 
-trials.add_to(app)
-for _command in (simulate, compare, plot, explore):
-    register(app, _command)
-for _module in (autopilot, import_log, diagnosis, sweep, cables, install):
-    _module.add_to(app)
+def completion(shell: Literal["bash", "zsh", "fish"], /) -> int:
+    """Print the script that makes a shell complete commands and options; put it where your shell looks for
+    completions.
+
+    Args:
+        shell: bash, zsh or fish.
+    """
+    sys.stdout.write(app.generate_completion(prog_name="subzero", shell=shell))
+    return FINE
+
+
+COMMANDS: dict[str, Callable[..., int]] = {
+    "list": trials.list_shipped,
+    "new": trials.new,
+    "show": trials.show,
+    "validate": trials.validate,
+    "simulate": simulate,
+    "compare": compare,
+    "plot": plot,
+    "explore": explore,
+    "manoeuvre": autopilot.manoeuvre,
+    "autopilot": autopilot.fly_step,
+    "import": import_log.import_,
+    "diagnose": diagnosis.diagnose,
+    "calibrate": diagnosis.calibrate,
+    "challenge": diagnosis.challenge,
+    "sweep": sweep.sweep,
+    "export-fmu": cables.export_tether,
+    "import-line": cables.import_line,
+    "doctor": install.doctor,
+    "warm": install.warm,
+    "completion": completion,
+}
+for _name, _command in COMMANDS.items():
+    _examples = "\n".join(f"  {line}" for line in EXAMPLES[_name])
+    app.command(_command, name=_name, help_epilogue=f"Examples:\n\n{_examples}\n")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

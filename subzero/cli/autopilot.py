@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import cyclopts
 from cyclopts import Parameter
 
 import scenarios
-from subzero.cli.examples import register
 from subzero.cli.output_mode import FINE, NOT_STRICT, STOPPED, Flag, StrictOutputMode
 
 if TYPE_CHECKING:
@@ -22,7 +19,7 @@ if TYPE_CHECKING:
 
     from subzero.autopilot.steps import Pilot
     from subzero.cli.write_flights import Measured
-    from subzero.simulation.run import Progress
+    from subzero.simulation.refinement import Progress
 
     Fly = Callable[[str, Progress], tuple[xr.Dataset, dict[str, float]]]
 
@@ -157,12 +154,6 @@ def fly_step(
     return _deliver(trial, fly, out or Path(name), title, shown, output_mode)
 
 
-def add_to(app: cyclopts.App) -> None:
-    """Add the commands to the command line."""
-    register(app, manoeuvre)
-    register(app, fly_step, name="autopilot")
-
-
 def _size(name: str, rudder: float | None, planes: float | None) -> float | None:
     """Return the size that was asked for, in degrees; refuse the fin that the manoeuvre does not use."""
     from subzero.errors import UserError
@@ -186,7 +177,7 @@ def _deliver(
     from subzero.autopilot import AutopilotWarning
     from subzero.cli import write_flights
     from subzero.cli.progress import costs_of, progress_bar
-    from subzero.cli.write_results import refuse_warnings
+    from subzero.cli.write_results import is_well
     from subzero.results.netcdf_csv import open_output_folder
 
     with open_output_folder(folder) as output_folder:
@@ -197,7 +188,5 @@ def _deliver(
                 with progress_bar(f"Flying {trial.name}, {label}", lambda: costs_of(trial)) as progress:
                     measured[label] = fly(label, progress)
         summary = write_flights.write(measured, title, *shown, output_folder)
-    stopped = write_flights.print_flights(summary, list(measured), output_folder, output_mode)
-    for message in stopped:
-        print(message, file=sys.stderr)
-    return STOPPED if stopped or (output_mode.strict and refuse_warnings(summary)) else FINE
+    write_flights.print_flights(summary, list(measured), output_folder, output_mode)
+    return FINE if is_well(summary, output_mode) else STOPPED

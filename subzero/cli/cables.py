@@ -6,9 +6,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import cyclopts
-
-from subzero.cli.examples import register
 from subzero.cli.output_mode import FINE, PLAIN, OutputMode
 
 LARGEST_DECK = 10_000_000
@@ -95,9 +92,3 @@ def import_line(deck: Path, *, output_mode: OutputMode = PLAIN) -> int:
         for words in found.left_out:
             print(f"left out: {words}")
     return FINE
-
-
-def add_to(app: cyclopts.App) -> None:
-    """Add the commands to the command line."""
-    register(app, export_tether, "export-fmu")
-    register(app, import_line, "import-line")

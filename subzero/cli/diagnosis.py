@@ -9,11 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import cyclopts
 from cyclopts import Parameter
 
 import scenarios
-from subzero.cli.examples import register
 from subzero.cli.interrupts import INTERRUPTED, patience, print_interrupted
 from subzero.cli.output_mode import FINE, PLAIN, STOPPED, Flag, OutputMode
 from subzero.cli.progress import progress_bar
@@ -209,13 +207,6 @@ def challenge(
         print(f"Find it: subzero diagnose {scenario} {out / 'record.csv'}")
         print(f"Reveal it: subzero challenge --reveal {out}")
     return FINE
-
-
-def add_to(app: cyclopts.App) -> None:
-    """Add the commands to the command line."""
-    register(app, diagnose)
-    register(app, calibrate)
-    register(app, challenge)
 
 
 def _with_map(files: list[Path], map: Path | None) -> Sequence[Path | Record]:

@@ -9,10 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import cyclopts
 from cyclopts import Parameter
 
-from subzero.cli.examples import register
 from subzero.cli.output_mode import FINE, PLAIN, Flag, OutputMode
 from subzero.errors import UserError, printable
 
@@ -162,8 +160,3 @@ def _as_json(found: Imported) -> dict[str, Any]:
     rows = [dict(zip(HEADINGS, row, strict=True)) for row in found.table()]
     notes = list(found.record.notes) if found.record else []
     return {"log": found.source, "columns": rows, "notes": notes, "questions": found.mapping.questions}
-
-
-def add_to(app: cyclopts.App) -> None:
-    """Add the command to the command line."""
-    register(app, import_, "import")

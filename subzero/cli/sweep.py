@@ -9,9 +9,6 @@ from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Self
 
-import cyclopts
-
-from subzero.cli.examples import register
 from subzero.cli.output_mode import FINE, NOT_STRICT, STOPPED, Flag, StrictOutputMode
 from subzero.errors import UserError, missing_extra, printable, whole
 
@@ -88,11 +85,6 @@ def _executor(workers: int | None, scheduler: str | None) -> Iterator[Any]:
         yield pool
     finally:
         pool.shutdown(cancel_futures=True)
-
-
-def add_to(app: cyclopts.App) -> None:
-    """Add the command to the command line."""
-    register(app, sweep)
 
 
 LINE_EVERY_S = 30.0

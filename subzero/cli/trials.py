@@ -10,19 +10,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import cyclopts
 from cyclopts import Parameter
 
 import scenarios
 from scenarios.errors import Problem, ScenarioError, nearest_or_all
 from scenarios.quantities import KNOWN
-from subzero.cli.examples import register
 from subzero.cli.output_mode import FINE, PLAIN, Flag, OutputMode
 from subzero.errors import UserError, printable, real, short
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from scenarios.contents import Contents, Number
 
 Words = Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative=())]
@@ -65,11 +61,16 @@ def list_shipped(*, vehicles: Flag = False, cables: Flag = False, output_mode: O
     rows = {f"{kind}s": {name: first_line(kind, name) for name in shipped(f"{kind}s")} for kind in kinds}
     rows = rows or {"scenarios": {name: scenarios.describe(name) for name in scenarios.names()}}
     with output_mode.emit(rows):
-        table = _grid()
+        from rich.console import Console
+        from rich.markup import escape
+        from rich.table import Table
+
+        table = Table.grid(padding=(0, 2))
+        table.add_column(no_wrap=True)
         for names in rows.values():
             for name, words in names.items():
-                table.add_row(_bold(name), _plain(words))
-        _print(table)
+                table.add_row(f"[bold]{escape(printable(name))}[/bold]", escape(printable(words)))
+        Console(highlight=False).print(table)
     return FINE
 
 
@@ -229,13 +230,6 @@ def validate(path: Path, /, *, output_mode: OutputMode = PLAIN) -> int:
     return FINE
 
 
-def add_to(app: cyclopts.App) -> None:
-    """Add the commands to the command line."""
-    register(app, list_shipped, name="list")
-    for command in (new, show, validate):
-        register(app, command)
-
-
 def _toml(path: Path) -> tuple[str, str]:
     """Return the kind and the contents of a TOML file; raise an error if it cannot be used."""
     from scenarios.contents import contents, locate
@@ -299,31 +293,6 @@ def _record(path: Path) -> tuple[str, str]:
 
 
 # Tables.
-
-
-def _grid() -> Table:
-    from rich.table import Table
-
-    table = Table.grid(padding=(0, 2))
-    table.add_column(no_wrap=True)
-    return table
-
-
-def _print(table: Table) -> None:
-    from rich.console import Console
-
-    Console(highlight=False).print(table)
-
-
-def _bold(text: str) -> str:
-    return f"[bold]{_plain(text)}[/bold]"
-
-
-def _plain(text: str) -> str:
-    """Return a text that rich prints as it stands, brackets and all."""
-    from rich.markup import escape
-
-    return escape(printable(text))
 
 
 def _lines(found: Contents, width: int) -> Iterator[str]:

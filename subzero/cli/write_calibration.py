@@ -152,11 +152,11 @@ def advised(advice: Advice) -> str:
     return f"{advice.sentence} It would narrow the interval of {words}."
 
 
-def correlations(found: Calibration, least: float = STRONG) -> list[tuple[str, str, float]]:
-    """Return pairs of numbers with a correlation of at least this size, the strongest first."""
+def correlations(found: Calibration) -> list[tuple[str, str, float]]:
+    """Return pairs of numbers with a correlation of at least `STRONG`, the strongest first."""
     names, C = [estimate.name for estimate in found.estimates], found.correlation
     pairs = [(names[i], names[j], float(C[i, j])) for i in range(len(names)) for j in range(i)]
-    return sorted((pair for pair in pairs if abs(pair[2]) >= least), key=lambda pair: -abs(pair[2]))
+    return sorted((pair for pair in pairs if abs(pair[2]) >= STRONG), key=lambda pair: -abs(pair[2]))
 
 
 def _short(name: str) -> str:

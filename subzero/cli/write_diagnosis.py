@@ -62,9 +62,9 @@ MOST_ROWS = 12
 """Number of indistinguishable causes that are shown on the terminal; the report has them all."""
 
 
-def print_plan(rows: Sequence[Detectability], console: Console | None = None) -> None:
+def print_plan(rows: Sequence[Detectability]) -> None:
     """Print how much the records cannot show, or not tell apart, before anything is compared."""
-    console = console or Console()
+    console = Console()
     hidden = tables.detectable(rows)
     if not hidden.rows:
         console.print("These records can tell all causes of the catalogue apart (D ≥ 16).", highlight=False)

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from subzero.cli.output_mode import COMMAND, PLAIN, OutputMode
+from subzero.cli.output_mode import COMMAND, OutputMode
 from subzero.errors import printable
 from subzero.figures.style import (
     LINES,
@@ -71,9 +71,9 @@ def write(
 
 
 def print_flights(
-    summary: dict[str, Any], names: list[str], output_folder: OutputFolder, output_mode: OutputMode = PLAIN
-) -> list[str]:
-    """Print indices, warnings and where the files are; return the messages of runs that could not go on."""
+    summary: dict[str, Any], names: list[str], output_folder: OutputFolder, output_mode: OutputMode
+) -> None:
+    """Print indices, warnings and where the files are."""
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     table.add_column("")
     for name in names:
@@ -89,11 +89,6 @@ def print_flights(
         console.print(table, highlight=False)
         show_warnings({name: summary[name] for name in names}, console)
         console.print(output_folder.words(), highlight=False, markup=False)
-    return [
-        f"The {name} run stopped: {summary[name]['outcome_message']}"
-        for name in names
-        if summary[name]["outcome"] == "stopped"
-    ]
 
 
 HEADLINES = {

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich.console import Console
 
-from subzero.cli.output_mode import COMMAND, PLAIN, OutputMode
+from subzero.cli.output_mode import COMMAND, StrictOutputMode
 from subzero.results import netcdf_csv
 
 if TYPE_CHECKING:
     import xarray as xr
 
     import scenarios
+    from subzero.cli.app import Outputs
     from subzero.files.atomic_output import OutputFolder
     from subzero.records.record import Record
 
@@ -30,11 +30,9 @@ def write_all(
     runs: dict[str, xr.Dataset],
     record: Record | None,
     output_folder: OutputFolder,
+    outputs: Outputs,
     *,
-    width: float | None = None,
-    kind: str = "png",
-    exports: Sequence[str] = (),
-    float64: bool = False,
+    float64: bool,
 ) -> dict[str, Any]:
     """Write everything that belongs to some runs of one trial, and return their summary.
 
@@ -42,9 +40,7 @@ def write_all(
         runs: by label.
         record: the measured record, if there is one.
         output_folder: where to.
-        width: of the figures; None for two columns of a page. [inch]
-        kind: of the figures: png, svg or pdf.
-        exports: kinds of files for other programs (`subzero.results.export`).
+        outputs: which files are made, and how.
         float64: as of `output.write_run`.
     """
     from subzero.figures import draw, page_width
@@ -57,11 +53,11 @@ def write_all(
     output_folder.failed = any(run.attrs["outcome"] != "completed" for run in runs.values())
     for label, run in runs.items():
         netcdf_csv.write_run(run, output_folder, label, float64=float64)
-        write_exports(run, label, exports, output_folder)
+        write_exports(run, label, outputs.export, output_folder)
     netcdf_csv.write_summary(summary, output_folder)
-    with page_width(WIDTH if width is None else width):
+    with page_width(WIDTH if outputs.width is None else outputs.width):
         figures = draw(runs, record)
-        netcdf_csv.write_figures(figures, output_folder, kind)
+        netcdf_csv.write_figures(figures, output_folder, outputs.figures)
     netcdf_csv.write_page(
         page_of_runs(runs, summary, figures, command=COMMAND.get(), record=record), output_folder
     )
@@ -95,35 +91,30 @@ def write_film(kind: str | None, output_folder: OutputFolder) -> None:
 
 
 def print_results(
-    summary: dict[str, Any],
-    output_folder: OutputFolder,
-    *,
-    strict: bool = False,
-    output_mode: OutputMode = PLAIN,
+    summary: dict[str, Any], output_folder: OutputFolder, output_mode: StrictOutputMode
 ) -> bool:
-    """Print the summary and where the files are; say why runs could not go on, and if `strict`, that some warn.
-
-    Returns:
-        whether all is well.
-    """
-    from subzero.results.tables import RUNS, show
+    """Print the summary and where the files are; return whether all is well, as `is_well`."""
+    from subzero.results.tables import show
 
     with output_mode.emit(summary | output_folder.files()):
         console = Console()
         show(summary, console, whole=output_mode.verbose)
         console.print(output_folder.words(), highlight=False, markup=False)
-    stopped = [label for label in RUNS if summary.get(label, {}).get("outcome") == "stopped"]
-    for label in stopped:
-        print(f"The {label} run stopped: {summary[label]['outcome_message']}", file=sys.stderr)
-    return not (stopped or (strict and refuse_warnings(summary)))
+    return is_well(summary, output_mode)
 
 
-def refuse_warnings(summary: dict[str, Any]) -> bool:
-    """Say on standard error which runs end with warnings, as --strict wants it; return whether there are some."""
+def is_well(summary: dict[str, Any], output_mode: StrictOutputMode) -> bool:
+    """Say on standard error why runs could not go on, else under --strict which end with warnings; return whether all
+    is well.
+    """
     from subzero.results.tables import RUNS
 
-    counts = {label: len(summary[label]["warnings"]) for label in RUNS if label in summary}
+    runs = {label: summary[label] for label in RUNS if label in summary}
+    stopped = [label for label, run in runs.items() if run["outcome"] == "stopped"]
+    for label in stopped:
+        print(f"The {label} run stopped: {runs[label]['outcome_message']}", file=sys.stderr)
+    counts = {label: len(run["warnings"]) for label, run in runs.items()}
     warned = [f"{count} of the {label} run" for label, count in counts.items() if count]
-    if warned:
+    if warned and output_mode.strict and not stopped:
         print(f"Warnings under --strict: {', '.join(warned)}. All files are written.", file=sys.stderr)
-    return bool(warned)
+    return not (stopped or (warned and output_mode.strict))

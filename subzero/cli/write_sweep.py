@@ -6,9 +6,10 @@ The processes that ran the members draw the figures at the same time.
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -57,70 +58,53 @@ def write_sweep(
     effects = effects_of(plan.points, found)
     summary = summary_of(plan, store, found, effects)
     netcdf_csv.write_summary(summary, output_folder)
-    below = _in_short(summary)
-    shown = Shown(
-        points=plan.points,
-        job=plan.job,
-        found=found,
-        effects=effects,
-        words=plan.description,
-        warnings=below,
-    )
-    made = pictures(shown, pool)
+    title = {"words": plan.description, "scenario": plan.job.trial.name, "warnings": _in_short(summary)}
+    made = pictures(partial(drawn_here, plan.points, plan.job, found, effects, title), pool)
     with friendly_errors(output_folder.folder):
-        for name, each in made.items():
-            (output_folder.path / f"{name}.png").write_bytes(each.png)
-    figures = {name: item.drawn for name, item in made.items()}
+        for name, (png, _) in made.items():
+            (output_folder.path / f"{name}.png").write_bytes(png)
+    figures = {name: figure for name, (_, figure) in made.items()}
     netcdf_csv.write_page(page_of_sweep(plan, summary, figures, COMMAND.get()), output_folder)
     return summary
 
 
-@dataclass(frozen=True, kw_only=True)
-class Shown:
-    """The data of the figures: points, results, main effects; and the texts above and below."""
-
-    points: Points
-    job: Job
-    found: Gathered
-    effects: list[Effect]
-    words: str
-    warnings: str
+Picture = tuple[bytes, Drawn]
+"""A figure as the bytes of a PNG, and as it stands in a page."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Picture:
-    """A figure as the bytes of a PNG, and as it stands in a page."""
-
-    png: bytes
-    drawn: Drawn
-
-
-def pictures(shown: Shown, pool: WorkerPool | None = None) -> dict[str, Picture]:
+def pictures(
+    draw: Callable[[Sequence[str]], dict[str, Picture]], pool: WorkerPool | None = None
+) -> dict[str, Picture]:
     """Return the pictures that there are, by name, in the order of `FIGURES`; drawn by a pool, if there is one."""
     if pool is None:
-        made = drawn_here(shown, FIGURES)
+        made = draw(FIGURES)
     else:
-        made, asked = {}, {name: pool.submit(drawn_here, shown, [name]) for name in LONGEST_FIRST}
+        made, asked = {}, {name: pool.submit(draw, [name]) for name in LONGEST_FIRST}
         for name, each in asked.items():
             try:
                 made |= each.result()
             except BrokenExecutor:  # a user killed it: no member is lost by that, and no figure
-                made |= drawn_here(shown, [name])
+                made |= draw([name])
     return {name: made[name] for name in FIGURES if name in made}
 
 
-def drawn_here(shown: Shown, names: Sequence[str]) -> dict[str, Picture]:
-    """Draw those of some figures that there are, in this process."""
+def drawn_here(
+    points: Points,
+    job: Job,
+    found: Gathered,
+    effects: list[Effect],
+    title: dict[str, str],
+    names: Sequence[str],
+) -> dict[str, Picture]:
+    """Draw those of some figures that there are, in this process; `title` has the texts of a `Title`."""
     from subzero.figures.style import Title
     from subzero.sweeps.figures import draw_sweep
 
-    title = Title(words=shown.words, scenario=shown.job.trial.name, warnings=shown.warnings)
-    figures = draw_sweep(shown.points, shown.job, shown.found, shown.effects, title, names)
     made = {}
-    for name, figure in figures.items():
+    for name, figure in draw_sweep(points, job, found, effects, Title(**title), names).items():
         held = io.BytesIO()
         netcdf_csv.save(figure, held, "png")
-        made[name] = Picture(png=held.getvalue(), drawn=drawn(figure))
+        made[name] = held.getvalue(), drawn(figure)
     return made
 
 

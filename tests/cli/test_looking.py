@@ -14,8 +14,8 @@ import pytest
 
 import scenarios
 from scenarios.files import shipped, shipped_path
+from subzero.cli import EXAMPLES
 from subzero.cli.app import FINE, MISTAKE, app, main
-from subzero.cli.examples import EXAMPLES
 
 STRANGE = "<b>x</b> $\\\\frac$ [bold]Zürich[/bold] 日本 " + "z" * 300
 PLANES = ("stern_plane_port_command_deg", "stern_plane_starboard_command_deg")

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from subzero.channels import BY_COLUMN
+from subzero.cli import EXAMPLES
 from subzero.cli.app import app
-from subzero.cli.examples import EXAMPLES
 
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
