@@ -182,11 +182,7 @@ def caption(name: str) -> str:
 def player() -> str:
     """Return the player as one script: its modules in order, without the lines that import one from another."""
     texts = [asset(f"player/{name}.js") for name in MODULES]
-    return "\n".join(re.sub(r"^export ", "", _without_imports(text), flags=re.MULTILINE) for text in texts)
-
-
-def _without_imports(text: str) -> str:
-    return re.sub(r"^import [^;]*;\n", "", text, flags=re.MULTILINE)
+    return "\n".join(re.sub(r"^(import [^;]*;\n|export )", "", text, flags=re.MULTILINE) for text in texts)
 
 
 @cache

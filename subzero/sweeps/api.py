@@ -6,7 +6,7 @@ import os
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from time import monotonic
@@ -97,13 +97,12 @@ def sweep(
     if client is not None and workers is not None:
         raise UserError("sweep: workers and client are both given. Give one of them.")
     workers = workers if client is None else client
-    if out is not None:
-        with finished(plan, Path(out), workers=workers, progress=progress) as store:
-            deliver(plan, store, Path(out))
-        return open_result(Path(out) / RESULT)
-    with tempfile.TemporaryDirectory(prefix="subzero-sweep-") as folder:
+    place = tempfile.TemporaryDirectory(prefix="subzero-sweep-") if out is None else nullcontext(out)
+    with place as folder:
         with finished(plan, Path(folder), workers=workers, progress=progress) as store:
             deliver(plan, store, Path(folder))
+        if out is not None:
+            return open_result(Path(folder) / RESULT)
         with open_result(Path(folder) / RESULT) as runs:
             return runs.load()
 

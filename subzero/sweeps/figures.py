@@ -120,7 +120,7 @@ def _histograms(found: Gathered, alive: list[int], title: Title) -> Figure:
         flat = np.ptp(values) <= 1e-9 * max(np.abs(values).max(), 1e-300)
         axes.hist(
             values,
-            bins=1 if flat else _bins(values),
+            bins=1 if flat else int(np.clip(np.sqrt(values.size), 5, 60)),
             color=BLUE,
             alpha=0.75,
             edgecolor="white",
@@ -134,11 +134,6 @@ def _histograms(found: Gathered, alive: list[int], title: Title) -> Figure:
     panels[0].plot([], [], color=ORANGE, label="median, 5 and 95 %")
     legend(panels[0], 1)
     return figure
-
-
-def _bins(values: np.ndarray) -> int:
-    """Return how many bars a histogram has: as many as the root of the members, some dozens at most."""
-    return int(np.clip(np.sqrt(values.size), 5, 60))
 
 
 def _against(points: Points, found: Gathered, effects: list[Effect], title: Title) -> Figure:

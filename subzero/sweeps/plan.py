@@ -181,13 +181,14 @@ def _plan_in(source: Source, name: str) -> Plan:
             raise UserError(f"{name}: {section} is {short(table[section])}. Allowed: a section [{section}].")
     kept = table.get("outcomes", {})
     _check_keys(name, "outcomes", kept)
-    if not isinstance(table.get("trial"), str):
+    named = table.get("trial")
+    if not isinstance(named, str):
         raise UserError(
             f'{name}: it does not say which trial is swept. Add trial = "fig6", or the path of a trial file.'
         )
     try:
         plan = plan_sweep(
-            _trial_of(table["trial"], source.folder),
+            source.folder / named if named.endswith(".toml") else named,  # a path is from the file's folder
             _dotted(table.get("parameters", {})),
             design=Design(
                 kind=table.get("design", "grid"), samples=table.get("samples"), seed=table.get("seed", 0)
@@ -214,26 +215,17 @@ def _check_keys(file: str, section: str, table: Mapping[str, Any]) -> None:
             )
 
 
-def _trial_of(named: str, folder: Path) -> str | Path:
-    """Return a shipped trial's name, or a path from the folder of the file that names it."""
-    return folder / named if named.endswith(".toml") else named
-
-
 def _dotted(table: Mapping[str, Any], above: str = "") -> dict[str, Any]:
     """Return dotted names → their values, whether the quotes were left out or not."""
     found: dict[str, Any] = {}
     for key, inside in table.items():
         name = f"{above}{key}"
-        is_spread = isinstance(inside, Mapping) and any(
-            not isinstance(each, Mapping) for each in inside.values()
+        is_section = isinstance(inside, Mapping) and (
+            all(isinstance(each, Mapping) for each in inside.values())
+            or not any(key in DISTRIBUTION_KEYS for key in inside)
         )
-        if isinstance(inside, Mapping) and not (is_spread and _has_spread(inside)):
+        if is_section:
             found |= _dotted(inside, f"{name}.")
         else:
             found[name] = inside
     return found
-
-
-def _has_spread(table: Mapping[str, Any]) -> bool:
-    """Return whether a table is a spread, and no section without quotes."""
-    return any(key in DISTRIBUTION_KEYS for key in table)
