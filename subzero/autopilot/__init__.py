@@ -53,8 +53,7 @@ _NAMES = {
     "subzero.autopilot.tuning": "Tuning tune",
     "subzero.steady_motion.asked": "NoTrimError",
     "subzero.steady_motion.hull_state_space": "INPUTS STATES UNITS",
-    "subzero.steady_motion.station_trim": "station_trim",
-    "subzero.steady_motion.trim": "trim",
+    "subzero.steady_motion.trim": "station_trim trim",
     "subzero.steady_motion.trim_point": "Trim",
 }
 """Module → its public names; no module of this package may be called like one of them."""
