@@ -147,12 +147,6 @@ class Kept:
                 replace(problem, file="--every", key="") for problem in error.problems
             ) from error
 
-    def folder(self, trial: scenarios.Trial) -> Path:
-        """Return where the files go."""
-        from subzero.cli import write_results
-
-        return self.out or write_results.default_folder(trial)
-
     @contextmanager
     def kept_in(self, folder: Path) -> Iterator[dict[str, Any]]:
         """Give the checkpoint of a command as an argument of a run; it is removed when all is delivered."""
@@ -279,7 +273,7 @@ def _deliver(
     from subzero.results.netcdf_csv import open_output_folder
 
     outputs.refuse_impossible()
-    folder = kept.folder(kept.of(trial))
+    folder = kept.out or write_results.default_folder(kept.of(trial))
     with kept.kept_in(folder) as checkpoint, open_output_folder(folder) as output_folder:
         trial, extended = inputs.checked(scenario)
         trial = kept.of(trial)

@@ -54,11 +54,6 @@ class Search:
     screen: Flag = False
     seconds: float | None = None
 
-    @property
-    def budget(self) -> str:
-        """The same in the words of `subzero.diagnose`."""
-        return "screen" if self.screen else "full"
-
 
 FULL_SEARCH = Search()
 
@@ -309,7 +304,7 @@ def _ask(logged: list[Logged], own: tuple[Effect, ...], search: Search, output_m
             effects=own,
             progress=progress,
             seed=search.seed,
-            budget=search.budget,
+            budget="screen" if search.screen else "full",
             seen=seen,
             seconds=search.seconds,
         )

@@ -299,7 +299,8 @@ def shape_3d(run: xr.Dataset, title: Title) -> Figure:
     words = "\n".join(textwrap.wrap(title.words, LETTERS_A_LINE)[:2])
     figure.text(0.05, 0.97, words, va="top", fontsize=style.LARGE, parse_math=False)
     has_cable = bool(run["node_count"].values.any())
-    way = run["cable_position"].values[:, 0] if has_cable else _way_of_hull(run)
+    hull = np.stack([run[name].values for name in CHANNEL], axis=1)
+    way = run["cable_position"].values[:, 0] if has_cable else hull
     axes.plot(
         *way.T,
         color=style.GREY,
@@ -330,11 +331,6 @@ def _shapes_in_space(run: xr.Dataset, axes: Any) -> None:
         place, colour = run["cable_position"].values[at], colormaps["viridis"](share)
         axes.plot(*place.T, color=colour, linewidth=1.4, label=f"{run['time'].values[at]:.3g} s")
         axes.plot(*place[:1].T, "o", color=colour, markersize=3.5)
-
-
-def _way_of_hull(run: xr.Dataset) -> np.ndarray:
-    """Return where the hull goes (n, 3). [m]"""
-    return np.stack([run[name].values for name in CHANNEL], axis=1)
 
 
 def _in_proportion(axes: Any) -> None:

@@ -75,9 +75,10 @@ def read_metadata(path: Path) -> Metadata:
     if problems:
         raise UserError(listed(f"The sidecar {printable(str(path))} cannot be used:", problems))
     said = source.table
+    named = said.get("scenario", "")  # a shipped scenario, or a path from the sidecar's folder
     return Metadata(
         source=printable(said.get("source", "")),
-        scenario=_scenario(said.get("scenario", ""), path.parent),
+        scenario=str(path.parent / named) if named.endswith(".toml") else named,
         tethered=said.get("tethered", True),
         over_ground=said.get("surge_speed", "water") == "ground",
         checked=_trusted(said.get("units_checked", [])),
@@ -92,11 +93,6 @@ def _toml(path: Path) -> Source:
     except ScenarioError as error:
         problems = [str(problem) for problem in error.problems]
         raise UserError(listed(f"The sidecar {printable(str(path))} cannot be used:", problems)) from None
-
-
-def _scenario(name: str, folder: Path) -> str:
-    """Return a shipped scenario's name as it is; a path starts from the sidecar's folder."""
-    return str(folder / name) if name.endswith(".toml") else name
 
 
 def _at(source: Source, key: str) -> str:

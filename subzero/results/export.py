@@ -254,7 +254,9 @@ def write_mat(run: xr.Dataset, path: Path) -> None:
     """
     from scipy.io import savemat
 
-    everything: dict[str, Any] = {str(name): _matlab(run[name].values) for name in run.variables}
+    everything: dict[str, Any] = {str(name): run[name].values for name in run.variables}
+    # A text becomes a cell of MATLAB.
+    everything = {name: x if x.dtype.kind in "biuf" else x.astype(object) for name, x in everything.items()}
     for name, key in (("units", "units"), ("meanings", "long_name")):
         everything[name] = {
             str(variable): run[variable].attrs[key]
@@ -264,11 +266,6 @@ def write_mat(run: xr.Dataset, path: Path) -> None:
     everything["axes"] = {str(var): ", ".join(map(str, run[var].dims)) for var in run.data_vars}
     everything["about"] = {str(name): value for name, value in run.attrs.items()}
     savemat(path, everything, long_field_names=True, do_compression=True, oned_as="column")
-
-
-def _matlab(values: np.ndarray) -> np.ndarray:
-    """Return texts as a cell array of MATLAB, numbers as they are."""
-    return values if values.dtype.kind in "biuf" else values.astype(object)
 
 
 def write_parquet(run: xr.Dataset, path: Path) -> None:
