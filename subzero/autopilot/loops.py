@@ -141,10 +141,10 @@ class Loop:
         return command
 
     def _begin(self, reading: Observation, command: float) -> None:
-        """Begin to estimate what is not measured, under a command; nothing here."""
+        """Begin to estimate states that no sensor measures, under a command; nothing here."""
 
     def _go_on(self, reading: Observation, speed: float, command: float, rate: float) -> None:
-        """Go on with that by a sample."""
+        """Go on with that by a sample; nothing here."""
 
     def _jump(self, reading: Observation, wanted: float, speed: float, rate: float) -> float:
         """Return the change of the integral at a jump of the set-point, (1 − b) k_y Δ."""

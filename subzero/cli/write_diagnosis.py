@@ -7,7 +7,6 @@ and the measured vehicle are ghosts.
 from __future__ import annotations
 
 import dataclasses
-import json
 import shlex
 import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -40,7 +39,7 @@ from subzero.diagnosis.results import (
     Verdict,
 )
 from subzero.errors import DISTRIBUTION, printable
-from subzero.page.replay import HULL, Actor, as_run, encode
+from subzero.page.replay import Actor, as_run, can_be_replayed, encode
 from subzero.page.report import Answer, Line, Report, Section, render
 from subzero.page.report import Table as Rows
 from subzero.results.netcdf_csv import write_figures
@@ -322,7 +321,7 @@ def replayed(
     known = all_effects(with_own(effects, logged.setting.model.vehicle))
     name, extended = _best(verdict)
     nominal = run(logged.setting)
-    if nominal.sizes["time"] < 2 or not all(part in _vehicle(nominal) for part in HULL):
+    if not can_be_replayed(nominal):
         return (), ""
     best = run(apply_extended(extended, logged.setting, known)) if extended is not None else None
     found = [Actor(name=name, run=best)] if best is not None and best.sizes["time"] > 1 else []
@@ -347,10 +346,6 @@ def _as_corrected(record: Record, verdict: Verdict, name: str) -> Record:
     if not verdict.then or curves is None:
         return record
     return dataclasses.replace(record, time=curves.time, values=dict(curves.measured))
-
-
-def _vehicle(run: xr.Dataset) -> dict[str, Any]:
-    return dict(json.loads(run.attrs["parameters"]).get("vehicle", {}))
 
 
 def _best(verdict: Verdict) -> tuple[str, Extended | None]:

@@ -95,23 +95,22 @@ def check_readable(path: str | Path) -> None:
 
 def _begin(path: str | Path, count: int) -> bytes:
     """Return the first bytes of a plain file that holds one result."""
+    data, is_missing = None, False
     try:
         data = _first_bytes(Path(path), count)
+        why, remedy = (
+            "this is a device, a pipe or a socket, not a file",
+            "Save what it gives to a file first.",
+        )
     except FileNotFoundError:
-        raise UnreadableFileError(
-            str(path), "there is no such file", "Check the path.", is_missing=True
-        ) from None
+        why, remedy, is_missing = "there is no such file", "Check the path.", True
     except IsADirectoryError:
         why, remedy = "this is a folder, not a file", "Name a file in it."
-        raise UnreadableFileError(str(path), why, remedy) from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         why, remedy = f"it cannot be read ({reason})", "Name a file that you may read."
-        raise UnreadableFileError(str(path), why, remedy) from None
     if data is None:
-        why = "this is a device, a pipe or a socket, not a file"
-        remedy = "Save what it gives to a file first."
-        raise UnreadableFileError(str(path), why, remedy)
+        raise UnreadableFileError(str(path), why, remedy, is_missing=is_missing)
     _refuse_half_written(Path(path))
     return data
 

@@ -179,7 +179,7 @@ def by_field(field: str, yes: Callable[..., Result], no: Callable[..., Result]) 
     def typed(line, c, *more):  # type: ignore[no-untyped-def]
         return _plain(yes if field in c.fields else no, (line, c))
 
-    # Not strict: what is chosen has names and a number of arguments of its own.
+    # Not strict: the chosen functions have names and a number of arguments of their own.
     numba.extending.overload(choose, strict=False)(typed)
     return choose
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from typing import TYPE_CHECKING, Any
 
-from subzero.page.replay import HULL, actors_of, encode
+from subzero.page.replay import actors_of, can_be_replayed, encode
 from subzero.page.report import Line, Report, Section, Table, render
 from subzero.results.tables import NOTHING, RUNS, fit_rows, index_in_words, number_groups
 
@@ -48,16 +48,10 @@ def page_of_runs(
             warnings=_warnings(summary, labels),
             notes=[f"{label} run: {each['message']}" for label in labels for each in summary[label]["notes"]],
             sections=_sections(_tables(summary, labels), figures),
-            replay=encode(actors_of(runs), record) if _can_be_replayed(first) else None,
+            replay=encode(actors_of(runs), record) if can_be_replayed(first) else None,
             sources=_sources(first),
         )
     )
-
-
-def _can_be_replayed(run: xr.Dataset) -> bool:
-    """Return whether there is anything to replay: at least two samples, of a vehicle whose shape is known."""
-    shape = json.loads(run.attrs["parameters"]).get("vehicle", {})
-    return run.sizes["time"] > 1 and all(name in shape for name in HULL)
 
 
 def _outcome(label: str, run: dict[str, Any]) -> list[Line]:

@@ -62,6 +62,12 @@ class Actor:
     ghost: bool = False
 
 
+def can_be_replayed(run: xr.Dataset) -> bool:
+    """Return whether there is anything to replay: at least two samples, of a vehicle whose shape is known."""
+    shape = json.loads(run.attrs["parameters"]).get("vehicle", {})
+    return run.sizes["time"] > 1 and all(name in shape for name in HULL)
+
+
 def actors_of(runs: dict[str, xr.Dataset]) -> tuple[Actor, ...]:
     """Return the vehicles of some runs by name: the first one solid, the others as ghosts."""
     return tuple(Actor(name=name, run=run, ghost=at > 0) for at, (name, run) in enumerate(runs.items()))
