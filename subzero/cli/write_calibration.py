@@ -184,10 +184,7 @@ def mapping(found: Calibration) -> dict[str, Any]:
             "matrix": found.correlation,
         },
         "not_determined": [asdict(direction) for direction in found.directions],
-        "profiles": {
-            name: {"values": profile.values, "rise": profile.rise, "low": profile.low, "high": profile.high}
-            for name, profile in found.profiles.items()
-        },
+        "profiles": {name: asdict(profile) for name, profile in found.profiles.items()},
         "held_out": {
             "how": found.how,
             "before": found.error("before"),
