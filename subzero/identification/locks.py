@@ -20,11 +20,12 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import ndtri
 
-from subzero.identification.explanation import CLOCK, Entry, Term, Terms, without
-from subzero.identification.fit import Fit, free_fit
+from subzero.identification.explanation import CLOCK, Entry, Term, Terms, data_terms, without
+from subzero.identification.fit import Fit, Products, free_fit, spreads
 from subzero.identification.model import COMMAND
-from subzero.identification.nearness import rests_on_histories
+from subzero.identification.nearness import rests_on_histories, witnesses
 from subzero.identification.problem import FEWEST_SAMPLES, Problem
 from subzero.identification.record import Record
 
@@ -92,30 +93,78 @@ def locks(problem: Problem, best: Fit, held_out: Sequence[Record], *, settled: b
     if others:
         gains |= _gains(problem, best, others, _folds(problem, held_out, split, gap))
     rests = _share_unknown(problem, terms) > MOST and rests_on_histories(problem, best)
+    doubted = _doubted(problem, best, rests=rests)
     return {
-        term.id: _locks(problem, term, gains.get(term.id), rests=rests, settled=settled) for term in terms
+        term.id: _locks(
+            term, gains.get(term.id), [*_late_commands(problem, term), *doubted.get(term.id, ())], settled
+        )
+        for term in terms
     }
 
 
-def _locks(problem: Problem, term: Term, gain: Gain | None, *, rests: bool, settled: bool) -> Locks:
-    reasons = [f"{name} may as well act late or early" for name in _late_commands(problem, term)]
+def _locks(term: Term, gain: Gain | None, reasons: Sequence[str], settled: bool) -> Locks:
+    found = list(reasons)
     if not settled and not _is_plain(term):
-        reasons.append("the search was ended before all that is next to it was tried")
-    if rests and not _is_plain(term) and term.kind != "unknown":
-        reasons.append(
-            "an unknown input acts for most of the time, without which the model explains less than half of a channel"
-        )
+        found.append("the search was ended before all that is next to it was tried")
     if gain is not None and not gain.holds:
-        reasons.append(
+        found.append(
             f"it does not surely predict {gain.what}: {gain.before:.2f} levels of the sensors without it, "
             f"{gain.after:.2f} with it"
         )
-    return Locks(gain, tuple(reasons))
+    return Locks(gain, tuple(found))
+
+
+def _doubted(problem: Problem, best: Fit, *, rests: bool) -> dict[str, list[str]]:
+    """Return term → why an error of the model may look like it: where channels rest on unknown inputs all but these and
+    plain ones; and a unit with a factor that the readings hardly show, if no other channel bears witness to the model.
+    """
+    found: dict[str, list[str]] = {}
+    for term in best.terms:
+        is_factor = term.kind == "unit" and _is_plain(term)
+        if rests and not _is_plain(term) and term.kind != "unknown":
+            found[term.id] = [
+                "an unknown input acts for most of the time, without which the model explains less than half of a "
+                "channel"
+            ]
+        elif (
+            is_factor
+            and witnesses(problem, best) <= {term.target}
+            and _by_chance(problem, best, term) > 2.0 * SURE
+        ):
+            found[term.id] = [
+                "no other channel agrees with the model as it is, and another factor may serve as well"
+            ]
+    return found
 
 
 def _is_plain(term: Term) -> bool:
     """Return whether no error of the model looks like a term: a unit with a factor, equal readings."""
     return term.kind in PLAIN and not (term.kind == "unit" and abs(term.factor) == 1.0)
+
+
+def _by_chance(problem: Problem, best: Fit, term: Term) -> float:
+    """Return the probability that one of a channel's known factors is where the readings say that any factor is, if all
+    factors between the least and the largest are equally probable.
+    """
+    units = [each for each in data_terms(problem.model) if (each.kind, each.target) == ("unit", term.target)]
+    logs = np.unique(np.log(np.abs([each.factor for each in units])))
+    sd = _spread_of_factor(problem, best, term, float(np.ptp(logs)))
+    return float((logs != 0.0).sum() * 2.0 * ndtri(1.0 - SURE) * sd / np.ptp(logs))
+
+
+def _spread_of_factor(problem: Problem, best: Fit, term: Term, prior: float) -> float:
+    """Return the standard deviation of the logarithm of a unit's factor, were it free with a wide prior."""
+    linear, name = best.linear, term.target
+    others = [i for i, entry in enumerate(best.entries) if (entry.kind, entry.name) != ("gain", name)]
+    J = {
+        each: np.column_stack([columns[:, others], np.zeros(len(columns))])
+        for each, columns in linear.J.items()
+    }
+    at = problem.where(problem.readings_of(name, best.terms), term)
+    J[name][at, -1] = (problem.recorded(name, best.terms) - linear.e[name])[at]
+    sd = np.append(spreads([best.entries[i] for i in others], linear.levels), prior)
+    A, *_ = Products(problem, best.terms, linear.e, J).total(linear.levels.noise)
+    return prior * math.sqrt(np.linalg.inv(sd[:, None] * A * sd + np.eye(sd.size))[-1, -1])
 
 
 def _share_unknown(problem: Problem, terms: Sequence[Term]) -> float:
@@ -130,11 +179,11 @@ def _share_unknown(problem: Problem, terms: Sequence[Term]) -> float:
 
 
 def _late_commands(problem: Problem, term: Term) -> list[str]:
-    """Return the commands that may as well act late: those that may be off, if all readings are late together."""
+    """Return that commands may as well act late: those that may be off, if all readings are late together."""
     if term.kind != "delay" or (term.target != CLOCK and len(problem.channels) > 1):
         return []
-    names = [each.name for each in problem.model.always]
-    return [name.removeprefix(COMMAND) for name in names if name.startswith(COMMAND)]
+    names = [each.name for each in problem.model.always if each.name.startswith(COMMAND)]
+    return [f"{name.removeprefix(COMMAND)} may as well act late or early" for name in names]
 
 
 class Fold(NamedTuple):

@@ -168,14 +168,33 @@ def _without_histories(problem: Problem, fitted: Fit) -> dict[str, np.ndarray]:
 
 def rests_on_histories(problem: Problem, fitted: Fit) -> bool:
     """Return whether there is a channel of which a model explains less than half without unknown inputs and drifts."""
-    found = _without_histories(problem, fitted)
-    for name, level in problem.levels(fitted.terms).items():
-        if name in problem.channels:
-            used = problem.used(name, fitted.terms)
-            shown, left = problem.recorded(name, fitted.terms)[used], rms(found[name][used])
-            if left > NEAR_LEFT * _most(problem, name, level) and left**2 > EXPLAINED * np.var(shown):
-                return True
-    return False
+    return any(
+        share > EXPLAINED and left > NEAR_LEFT * _most(problem, name, problem.levels(fitted.terms)[name])
+        for name, left, share in _unexplained(problem, fitted)
+    )
+
+
+def witnesses(problem: Problem, fitted: Fit) -> set[str]:
+    """Return the channels of which a model explains more than half without unknown inputs and drifts, with no error in
+    their data but a known unit.
+    """
+    soft = {term.target for term in fitted.terms if term.is_data_error and term.kind != "unit"}
+    return {
+        name
+        for name, _, share in _unexplained(problem, fitted)
+        if share < EXPLAINED and name not in soft and _moves(problem, fitted, name)
+    }
+
+
+def _unexplained(problem: Problem, fitted: Fit) -> Iterator[tuple[str, float, float]]:
+    """Yield every channel with what an explanation leaves of it without unknown inputs and drifts, root mean square,
+    and which share of the squares of the readings about their mean that is.
+    """
+    for name, e in _without_histories(problem, fitted).items():
+        used = problem.used(name, fitted.terms)
+        left = rms(e[used])
+        variance = float(np.var(problem.recorded(name, fitted.terms)[used]))
+        yield name, left, left**2 / variance if variance > 0.0 else np.inf
 
 
 def follows(problem: Problem, fitted: Fit) -> bool:

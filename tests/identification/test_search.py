@@ -160,3 +160,21 @@ def test_a_known_unit_is_named_beside_an_input_that_acts_all_the_time():
     columns["b"] = 0.1 * np.cumsum(push) + 0.05 * rng.standard_normal(300)
     verdict = sd.diagnose(sd.Record(time, columns), model)
     assert {each.id for each in verdict.named} == {"unit:a", "unknown:push"}
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_unit_is_named_only_if_the_factor_is_seen_or_another_channel_agrees(known):
+    """A depth in feet that grows with a weight that is hardly known: another factor serves with another weight.
+    A speed shows the weight, and so the factor.
+    """
+    model = sd.Model(
+        lambda p, u, t: {"depth": 0.5 * p["weight"] * t**2, "speed": p["weight"] * t},
+        {"depth": sd.Sensor(noise=0.05, unit="m"), "speed": sd.Sensor(noise=0.05, unit="m/s")},
+        parameters=[sd.Number("weight", 0.02, tolerance=0.02)],
+    )
+    time, rng = 0.25 * np.arange(40), np.random.default_rng(3)
+    columns = {"depth": (0.5 * 0.05 * time**2 + 0.05 * rng.standard_normal(40)) / 0.3048}
+    if known:
+        columns["speed"] = 0.05 * time + 0.05 * rng.standard_normal(40)
+    verdict = sd.diagnose(sd.Record(time, columns), model)
+    assert [each.id for each in verdict.named] == ["unit:depth"] * known
