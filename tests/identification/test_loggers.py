@@ -82,11 +82,13 @@ def test_two_columns_that_are_exchanged_are_named(noise):
     assert verdict.named[0].sentence == "rod and middle have each other's readings"
 
 
+@pytest.mark.long
 def test_exchanged_columns_beside_a_cause():
     verdict = sd.diagnose(swapped(record(a=1.4), "middle", "end"), model())
     assert {each.id for each in verdict.named} == {"swapped:middle/end", "loss"}
 
 
+@pytest.mark.long
 def test_exchanged_columns_of_which_one_is_in_another_unit():
     given = record(1)
     columns = {**given.columns, "rod": given.columns["rod"] * 10.0}
@@ -151,6 +153,7 @@ def test_two_inputs_with_the_other_sign_of_which_one_alone_brings_nothing_nearer
     assert verdict.named[0].sentence == "the inputs port and starboard have both the other sign"
 
 
+@pytest.mark.long
 def test_inputs_in_each_others_columns_beside_a_cause():
     verdict = sd.diagnose(swapped(record(7, a=1.4), "power", "second"), model())
     assert {each.id for each in verdict.named} == {"exchanged:power/second", "loss"}
@@ -173,6 +176,7 @@ def test_in_an_input_that_is_trusted_no_error_is_considered():
         dataclasses.replace(model(), trusted_inputs=["pwer"])
 
 
+@pytest.mark.long
 def test_several_threads_change_nothing():
     made = swapped(record(gain=1.5), "rod", "middle")
     assert str(sd.diagnose(made, dataclasses.replace(model(), parallel=True))) == str(

@@ -73,6 +73,7 @@ def test_a_unit_is_named_whatever_the_parameters_would_bend(factor, words):
     assert words in verdict.named[0].sentence
 
 
+@pytest.mark.long
 def test_of_a_linear_model_the_sign_of_the_readings_or_of_the_input_is_not_decided():
     seen = record(1)
     verdict = sd.diagnose(changed(seen, x=-seen.columns["x"]), model())
@@ -122,6 +123,7 @@ def test_a_clock_that_is_late_against_the_inputs_is_found_with_its_delay():
     assert estimate(verdict, "delay").value == pytest.approx(late, abs=0.02)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("late", [9.0, -6.0])
 def test_a_clock_that_is_late_by_far_more_than_usual_is_found(late):
     seen = record(3)

@@ -93,6 +93,7 @@ def test_no_model_is_asked_for_a_number_beyond_its_bounds(drag):
     assert found.id == "less@"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed, size", [(0, 30.0), (1, 300.0)])
 def test_a_channel_that_another_unit_makes_small_is_not_explained_by_that(seed, size):
     """A wander that has nothing to do with the model: divided by a hundred, with a drift, it is near anything."""
@@ -106,6 +107,7 @@ def test_a_channel_that_another_unit_makes_small_is_not_explained_by_that(seed, 
     assert "x is not explained, however small another unit makes it" in verdict.nearness.reasons
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [0, 2])
 def test_nothing_else_is_named_beside_an_input_that_explains_a_channel_alone(seed):
     """A wander that has nothing to do with the model: with any force the model follows it, and what else it then needs
@@ -124,6 +126,7 @@ def test_nothing_else_is_named_beside_an_input_that_explains_a_channel_alone(see
     assert "the model explains less than half of a channel" in suspected["stiffness"].against[0]
 
 
+@pytest.mark.long
 def test_units_that_leave_nothing_of_a_record_are_not_named():
     """The wander of another seed is near where it is divided until it is noise, and the force is a thousandth."""
     given = record(4)
@@ -145,6 +148,7 @@ def wander(seed, time):
     return x - x[0] + 0.01 * rng.standard_normal(time.size)
 
 
+@pytest.mark.long
 def test_a_known_unit_is_named_beside_an_input_that_acts_all_the_time():
     """Of a channel that the input does not move: what explains the other one does not make this one small."""
     model = sd.Model(

@@ -285,6 +285,7 @@ def test_a_usual_input_is_none_that_is_named():
     assert verdict.verdict == "nothing_near"
 
 
+@pytest.mark.long
 def test_the_history_is_in_text_json_and_picture():
     import matplotlib.pyplot as plt
 
