@@ -190,7 +190,7 @@ def _gather(
         numbers = [column.own.get(name, np.nan) for name in own]
         found.scalars[column.index] = np.concatenate([column.scalars, numbers])
         found.failed[column.index] = bool(column.reason)
-        found.warned.update({check for check, _ in column.warnings})
+        found.warned.update([*dict.fromkeys(check for check, _ in column.warnings)])
         if drawn[column.index]:
             found.channels[place[column.index]] = column.channels
 
