@@ -7,8 +7,9 @@ ranked again with noise of their own.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -25,8 +26,7 @@ from subzero.identification.explanation import (
     with_term,
 )
 from subzero.identification.fit import Levels, Linear, fitted_levels, levels_under, quieter
-from subzero.identification.problem import Problem
-from subzero.identification.sensitivities import Sensitivities
+from subzero.identification.problem import CORRECTIONS, Problem
 
 MOST_TERMS = 8
 """An explanation has no more terms."""
@@ -73,6 +73,45 @@ def distinct(ranked: Iterable[tuple[float, Linear]]) -> list[tuple[float, Linear
     for score, linear in ranked:
         found.setdefault(key(linear.terms), (score, linear))
     return list(found.values())
+
+
+Columns = Mapping[str, np.ndarray]
+"""Channel → residuals (m,), or sensitivities (m, n)."""
+
+
+class Sensitivities:
+    """Sensitivities to the numbers that a new term brings, which hold wherever noise hides one simulation from another.
+
+    Hundreds of terms are ranked around each fit, most of which hardly differ from another one. A fit computes
+    sensitivities of its own where those of its start do not hold.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        self._problem = problem
+        self._known: dict[Any, list[tuple[Columns, Columns]]] = {}
+
+    def of(
+        self, terms: Terms, entries: Sequence[Entry], x: np.ndarray, wanted: Sequence[int], e: Columns
+    ) -> Columns:
+        """Return sensitivities to some entries at x (n,), where the residuals are e."""
+        if all(entries[i].kind in CORRECTIONS for i in wanted):  # no simulation is needed
+            return self._problem.jacobian(terms, entries, x, wanted)
+        inputs = [(term.id, term.factor) for term in terms if term.kind in ("input", "exchanged")]
+        what = (*inputs, *((entries[i].identity, x[i]) for i in wanted))
+        known = self._known.setdefault(what, [])
+        for there, columns in known:
+            if self._are_alike(terms, e, there):
+                return columns
+        known.append((e, self._problem.jacobian(terms, entries, x, wanted)))
+        return known[-1][1]
+
+    def _are_alike(self, terms: Terms, e: Columns, there: Columns) -> bool:
+        """Return whether residuals differ by less than the levels of the sensors."""
+        levels = self._problem.levels(terms)
+        return all(
+            float(np.mean((e[name] - there[name])[self._problem.used(name, terms)] ** 2)) < levels[name] ** 2
+            for name in e
+        )
 
 
 class Ranking:
