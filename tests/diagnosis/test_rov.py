@@ -46,6 +46,7 @@ def record_of(trial, seed: int, missing: MissingForce | None = None) -> Record:
     return Record(source="hover.csv", time=time, values=values)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name,seed", [
     ("aft_starboard", 1), pytest.param("vertical_front_port", 2, marks=pytest.mark.long),
 ])  # fmt: skip
@@ -60,6 +61,7 @@ def test_a_thruster_that_does_less_is_named_with_its_size(trial_file, name, seed
     assert f"the thruster {name} does less than it is commanded" in cause.sentence
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.long)])
 def test_a_healthy_vehicle_gets_no_name(trial_file, seed):
     verdict = diagnose(record_of(HOVER, seed), trial_file, budget="verdict")

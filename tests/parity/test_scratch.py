@@ -69,7 +69,7 @@ def test_a_size_that_is_no_constant_is_refused():
 
 
 def test_interpreted_code_has_the_like():
-    from subzero.jit import stack as module
+    from subzero.jit import intrinsics as module
 
     array = module._interpreted(2, 3)
     assert array.shape == (2, 3)
