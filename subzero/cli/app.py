@@ -219,7 +219,8 @@ def simulate(
     def run(trial: scenarios.Trial, **how: Any) -> tuple[Runs, None]:
         from subzero.simulation.run import simulate
 
-        made = simulate(trial, tethered=not untethered, **how)
+        with _progress(trial, tethered=not untethered) as progress:
+            made = simulate(trial, tethered=not untethered, **how, progress=progress)
         return {"untethered" if untethered else "tethered": made}, None
 
     return _deliver(scenario, trial, run, inputs, kept, outputs, output_mode)
@@ -253,7 +254,8 @@ def compare(
     def run(trial: scenarios.Trial, **how: Any) -> tuple[Runs, Record | None]:
         from subzero.simulation.comparison import compare
 
-        result = compare(trial, measured=record, **how)
+        with _progress(trial) as progress:
+            result = compare(trial, measured=record, **how, progress=progress)
         return result.runs, result.measured
 
     return _deliver(scenario, trial, run, inputs, kept, outputs, output_mode)
@@ -277,8 +279,7 @@ def _deliver(
     with kept.kept_in(folder) as checkpoint, open_output_folder(folder) as output_folder:
         trial, extended = inputs.checked(scenario)
         trial = kept.of(trial)
-        with _progress(trial) as progress:
-            runs, record = run(trial, **extended, **checkpoint, progress=progress)
+        runs, record = run(trial, **extended, **checkpoint)
         runs = _refined(runs, trial, extended) if outputs.check else runs
         summary = write_results.write_all(runs, record, output_folder, outputs, float64=kept.float64)
         write_results.write_film(outputs.animate, output_folder)
@@ -524,13 +525,14 @@ def _refined(runs: Runs, trial: scenarios.Trial, extended: dict[str, Any]) -> Ru
 
     marked = {}
     for label, run in runs.items():
-        with _progress(trial, f"Checking the {label} run of {trial.name}") as progress:
+        words = f"Checking the {label} run of {trial.name}"
+        with _progress(trial, words, tethered=label == "tethered") as progress:
             marked[label] = refine(run, trial, **extended, progress=progress).marked_run()
     return marked
 
 
-def _progress(trial: scenarios.Trial, words: str = "") -> ProgressBar:
+def _progress(trial: scenarios.Trial, words: str = "", *, tethered: bool = True) -> ProgressBar:
     """Return a progress bar that reports the cost of this trial where it stands still."""
     from subzero.cli.progress import costs_of, progress_bar
 
-    return progress_bar(words or f"Simulating {trial.name}", lambda: costs_of(trial))
+    return progress_bar(words or f"Simulating {trial.name}", lambda: costs_of(trial, tethered))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -185,7 +186,8 @@ def _deliver(
             warnings.simplefilter("ignore", AutopilotWarning)  # the outcome reports it, below
             measured: Measured = {}
             for label in RUNS:
-                with progress_bar(f"Flying {trial.name}, {label}", lambda: costs_of(trial)) as progress:
+                costs = partial(costs_of, trial, label == "tethered")
+                with progress_bar(f"Flying {trial.name}, {label}", costs) as progress:
                     measured[label] = fly(label, progress)
         summary = write_flights.write(measured, title, *shown, output_folder)
     write_flights.print_flights(summary, list(measured), output_folder, output_mode)
