@@ -36,9 +36,10 @@ FEWEST_GAPS = 4.0
 MOST = 0.5
 """Where unknown inputs act for a longer share of the time, and a channel rests on them, little bears witness. [-]"""
 PLAIN = ("unit", "stuck")
-"""Kinds of terms that are named all the same: a known unit is plain, also where a model follows with an input's help
-(and `nearness` sees to it that the unit is not all that explains a channel); so are equal readings. Another sign or a
-turn is not: a model that is wrong may go the other way."""
+"""Kinds of terms that are named all the same: a known unit is plain, also where a model follows with an input's help,
+if its factor is seen or another channel agrees with the model (and `nearness` sees to it that the unit is not all that
+explains a channel); so are equal readings. Another sign or a turn is not: a model that is wrong may go the other way.
+"""
 BLOCKS, DRAWS, SURE = 20, 2000, 0.05
 """Blocks of a record, draws of the bootstrap, and the share of them outside an interval, to either side."""
 
@@ -164,7 +165,10 @@ def _spread_of_factor(problem: Problem, best: Fit, term: Term, prior: float) -> 
     J[name][at, -1] = (problem.recorded(name, best.terms) - linear.e[name])[at]
     sd = np.append(spreads([best.entries[i] for i in others], linear.levels), prior)
     A, *_ = Products(problem, best.terms, linear.e, J).total(linear.levels.noise)
-    return prior * math.sqrt(np.linalg.inv(sd[:, None] * A * sd + np.eye(sd.size))[-1, -1])
+    variance = np.linalg.inv(sd[:, None] * A * sd + np.eye(sd.size))[-1, -1]
+    return prior * math.sqrt(
+        max(variance, 0.0)
+    )  # rounding may leave less than nothing of a factor that is plain
 
 
 def _share_unknown(problem: Problem, terms: Sequence[Term]) -> float:
