@@ -73,7 +73,7 @@ def print_calibration(
         table.add_row(*row)
     lines = [printable(line) for line in (headline(found), *story(found))]
     lines += [output_folder.words()]
-    lines += [] if found.refused else [f'Fly it: vehicle = "{out.name}" in a trial beside it.']
+    lines += [] if found.refused else [f'Fly it: vehicle = "{out.name}" in a trial of the same folder.']
     with output_mode.emit(plain(mapping(found)) | output_folder.files()):
         console = Console()
         console.print(table, highlight=False)
