@@ -8,7 +8,7 @@ By the engine for any model, given as the tethered vehicle (`subzero2`):
              other formulation of the cable, manoeuvres and noise of the world; in trim, as the nominal vehicle is: the
              centre of buoyancy remains above the centre of gravity (3 % of either's place alone, measured from the
              middle of the hull, would be three tolerances of `cg_offset`, a cause that is rightly named), and the
-             cable's weight in water remains
+             cable's weight in water and the propeller's diameter remain
 
 Each name of a cause or of an error in the data is an invention. That something acts which is no cause is none: the
 model misses it.
@@ -129,8 +129,12 @@ def _off(model: Model, rng: np.random.Generator) -> dict[str, Any]:
     )
     vehicle = off(to_mapping(model.vehicle))
     cable = off(cable)
-    # As buoyant as before: 3 % of the mass or the diameter alone are three or six tolerances of `cable_weight`.
-    cable["mass_per_length"] = model.cable.mass_per_length * (cable["diameter"] / model.cable.diameter) ** 2
+    # As buoyant as before: 3 % of the mass or the cross-section alone are three tolerances of `cable_weight`.
+    cable["mass_per_length"] = (
+        model.cable.mass_per_length * cable["cross_section_area"] / model.cable.cross_section_area
+    )
+    # 3 % of its diameter alone would be 12 % of the propeller's thrust and 15 % of its torque, which are rightly named.
+    vehicle["propeller"]["diameter"] = model.vehicle.propeller.diameter
     vehicle["buoyancy"]["centre_of_buoyancy_x"] = vehicle["rigid_body"]["centre_of_gravity_x"]
     return {
         "vehicle": from_mapping(vehicle),
