@@ -157,7 +157,7 @@ def said(kind_made: tuple[str, Any]) -> tuple[str, str, identification.Verdict |
     kind, made = kind_made
     try:
         logged = numbers(*made) if kind == "numbers" else {"bolt": bolt, "remus": remus}[kind](made)
-    except subzero.UserError as error:
+    except (subzero.UserError, NoRunError) as error:
         return kind, f"{made}: {error}", None, 0.0
     begun = process_time()
     model, records = vehicle_model([logged])

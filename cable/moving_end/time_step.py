@@ -37,7 +37,7 @@ from cable.moving_end.state import (
     sample_water,
 )
 from cable.properties import CableNumbers
-from subzero.jit import compiled, inlined, inner, scratch
+from subzero.jit import compiled, expanded, inlined, inner, scratch
 
 TAUT = 1e-2
 """A step begins with at least this tension everywhere: Newton then looks for a taut cable first. [N]"""
@@ -118,7 +118,7 @@ def _takes_up(line: Line, drum: DrumNumbers) -> bool:
     return taken_up and drum.control == FREE and not line.ends.layout.free_end
 
 
-@compiled
+@expanded
 def _solve_softly(
     line: Line,
     step: float,

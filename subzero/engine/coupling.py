@@ -25,7 +25,7 @@ from subzero.engine.energy import book, take_jolt_of_motion
 from subzero.engine.external_wrench import tow_point
 from subzero.engine.run_state import IMPULSE, OVERLOAD, PEAK, Fixed, Live, Now, Setup
 from subzero.engine.vehicle_step import advance_hull, follow_track
-from subzero.jit import compiled, inlined, inner, scratch
+from subzero.jit import compiled, expanded, inlined, inner, scratch
 
 MOST_EXCHANGES = 60
 ROUNDING = 1e-14
@@ -47,7 +47,7 @@ FINE, CABLE_FAILED, DISAGREED, ABSURD = range(4)
 """How an exchange ended."""
 
 
-@inner
+@expanded
 def exchange(setup: Setup, live: Live, start: float, span: float) -> int:
     """Take one exchange from `start`, in parts where needed; the live state moves on only as far as it went well."""
     if setup.fixed.prescribed and setup.fixed.tethered:
@@ -75,7 +75,7 @@ def exchange(setup: Setup, live: Live, start: float, span: float) -> int:
                 return ending
 
 
-@inner
+@expanded
 def _follow_snaps(setup: Setup, live: Live, start: float, span: float) -> int:
     """Take one exchange in parts that follow the jumps of the pull; the next one goes on with parts as long.
 
@@ -225,7 +225,7 @@ def _straight_on(now: Now, ratio: float, i: int) -> float:
     return now.force[i] + ratio * (now.force[i] - now.force_before[i])
 
 
-@inlined
+@expanded
 def _move(setup: Setup, live: Live, start: float, span: float) -> bool:
     """Move the hull through an exchange; fill the tow point, relative to the drum; False if the speed is absurd."""
     steps = hull_steps(setup, span)

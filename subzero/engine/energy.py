@@ -35,7 +35,7 @@ from cable.moving_end import (
 )
 from subzero.engine.external_wrench import add_missing, row_at, sample_current, tow_wrench
 from subzero.engine.run_state import HEADING, LINEAR_ROWS, PITCH, TIME, Live, Setup
-from subzero.jit import allocating, inlined, inner
+from subzero.jit import allocating, expanded, inlined, inner
 from vehicle import kinetic_energy, power, rotation
 
 PROPELLER, HULL_LOSS, CABLE_LOSS, KINETIC, DRUM, ADDED, RESIDUAL = range(7)
@@ -69,7 +69,7 @@ def book(setup: Setup, live: Live, start: float, span: float, steps: int) -> Non
         total[RESIDUAL] -= total[i]
 
 
-@inlined
+@expanded
 def _book_hull(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
     """Add the hull's share of an exchange."""
     ledger = live.now.ledger

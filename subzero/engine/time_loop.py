@@ -17,7 +17,7 @@ from numba.experimental import structref
 from subzero.engine.coupling import FINE, exchange
 from subzero.engine.recording import Recording, note, record_row, row_of
 from subzero.engine.run_state import Live, Setup
-from subzero.jit import allocating, compiled, deferred_signals
+from subzero.jit import allocating, compiled, deferred_signals, expanded
 from subzero.jit.intrinsics import add
 from subzero.jit.intrinsics import exchange as exchange_number
 
@@ -68,7 +68,7 @@ def run_rows(
     return last, used, FINE
 
 
-@compiled
+@expanded
 def _reach(
     setup: Setup, live: Live, recording: Recording, times: np.ndarray, at: int, used: int, parts: int
 ) -> int:

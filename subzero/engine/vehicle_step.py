@@ -15,14 +15,14 @@ import numpy as np
 from subzero.engine.external_wrench import add_missing, row_at, sample_current, tow_wrench
 from subzero.engine.run_state import HEADING, LINEAR_ROWS, PITCH, PLACE, SLOPE, SPEED, TIME, Live, Setup
 from subzero.engine.station_keeping import INTEGRALS, steer
-from subzero.jit import allocating, compiled, inlined, inner, scratch
+from subzero.jit import allocating, compiled, expanded, inner, scratch
 from vehicle import derivative, derivative_and_power, finish_step, quaternion_from_euler, rotation
 
 GAUSS_OFFSET = 0.5 * np.sqrt(0.6)
 """Three-point Gauss quadrature: nodes at the middle and this fraction of a step before and behind it."""
 
 
-@inlined
+@expanded
 def advance_hull(setup: Setup, live: Live, start: float, span: float, steps: int) -> None:
     """Fill live.path[1 … steps] from path[0], pulled by F(t) = F_{n+1} + (t − t_{n+1}) (F_n − F_{n−1})/h_n.
 

@@ -3,7 +3,7 @@
 name                                            purpose                                               file
 ----------------------------------------------  ----------------------------------------------------  ------------
 compiled, allocating, inner, inlined,
-gated_inlined, by_field, by_field_at …          how a function is compiled                            decorators
+expanded, gated_inlined, by_field …            how a function is compiled                            decorators
 Record, made_once                               numbers as one record in memory, a single pointer     record
 scratch                                         a small array on the stack of a compiled function     intrinsics
 add, exchange                                   whole numbers that threads change together            intrinsics
@@ -18,6 +18,7 @@ from subzero.jit.decorators import (
     by_field_at,
     by_field_in_step,
     compiled,
+    expanded,
     gated_inlined,
     inlined,
     inner,
@@ -37,6 +38,7 @@ __all__ = [
     "compile_in_parallel",
     "compiled",
     "deferred_signals",
+    "expanded",
     "gated_inlined",
     "inlined",
     "inner",
