@@ -489,7 +489,7 @@ def _of_sensor(name: str, model: Model, terms: Terms, level: float, delay: float
     free = {kind for term in terms if term.is_data_error and term.target == name for kind in kinds_of(term)}
     wide = {
         "offset": off,
-        "step": off,
+        "step": OFFSET_LEVELS * level,  # a jump has nothing to do with how well the zero is set
         "drift": off,
         "gain": GAIN_SCALE,
         "delay": delay,

@@ -36,6 +36,8 @@ class Said(NamedTuple):
 def said_of(ranked: Sequence[Fit], probabilities: np.ndarray) -> Iterator[Said]:
     """Yield the terms of the best explanation with their probabilities.
 
+    A term that holds throughout says that something is wrong, which is so as well if it is wrong from some time on.
+
     Records that show that something changes with time, which no cause explains, may not tell what: of a single unknown
     input or drift the probability is that any of them holds, and the others are its alternatives, the most probable
     first, until one of them holds for sure.
@@ -47,7 +49,9 @@ def said_of(ranked: Sequence[Fit], probabilities: np.ndarray) -> Iterator[Said]:
     for each, p in every:
         for term in each.terms:
             what = _what(term)
-            own[what], terms[what] = own.get(what, 0.0) + p, terms.get(what, term)
+            terms.setdefault(what, term)
+            for said in {what, what.partition("@")[0]}:
+                own[said] = own.get(said, 0.0) + p
     anything = sum(p for each, p in every if any(map(_varies, each.terms)))
     single = sum(map(_varies, ranked[0].terms)) == 1
     for term in ranked[0].terms:
@@ -61,8 +65,9 @@ def said_of(ranked: Sequence[Fit], probabilities: np.ndarray) -> Iterator[Said]:
 
 
 def _what(term: Term) -> str:
-    """Return what a term says, whenever it does."""
-    return f"{term.kind}:{term.target}" if _varies(term) else term.id
+    """Return what a term says, up to "@" whenever it begins."""
+    said = f"{term.kind}:{term.target}" if _varies(term) else term.id
+    return f"{term.factor:.9g}, {term.offset:.9g} {said}" if term.kind in ("unit", "input") else said
 
 
 def _varies(term: Term) -> bool:

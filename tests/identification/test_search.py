@@ -1,7 +1,8 @@
 """Where a search begins: what the linear problem at the nominal model does not show.
 
 Verifies: a limit that does nothing near its nominal value is found; so is a step of a sensor that all other numbers can
-nearly make up for. Truth is the model with other numbers. Tolerance: 3 standard deviations of the verdict.
+nearly make up for, or that is large; and the other sign of readings. Truth is the model with other numbers. Tolerance:
+3 standard deviations of the verdict.
 """
 
 import dataclasses
@@ -44,6 +45,57 @@ def test_a_limit_that_does_nothing_near_its_nominal_value_is_found(seed):
     assert found.id == "slow"
     (size,) = found.estimates
     assert abs(size.value - 2.0) < 3.0 * size.sd
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_another_sign_is_named_though_the_nominal_model_is_nearer_to_the_wrong_readings(seed):
+    """A weight that is not trimmed tilts a vehicle to one side of 0, the wrong readings to the other."""
+
+    def tilt(p, u, t):
+        keep, slow, shown = np.exp(-(t[1] - t[0]) / p["lag"]), np.exp(-t / 8.0), []
+        by_plane = np.zeros_like(p["plane"])
+        for command, rest in zip(u["plane"], slow, strict=True):
+            shown.append(p["trim"] * (1.0 - rest) + by_plane)
+            by_plane = p["plane"] * command + (by_plane - p["plane"] * command) * keep
+        return {"tilt": np.array(shown)}
+
+    model = sd.Model(
+        tilt,
+        {"tilt": sd.Sensor(noise=0.1, unit="deg")},
+        inputs=["plane"],
+        parameters=[
+            sd.Number("trim", 0.0, tolerance=2.0),
+            sd.Number("plane", 1.0, tolerance=0.05),
+            sd.Number("lag", 1.0, tolerance=0.05),
+        ],
+        causes=[sd.Cause("plane", "the plane lifts otherwise", changes={"plane": 0.3})],
+        batch=True,
+    )
+    rng, time = np.random.default_rng(seed), 0.2 * np.arange(150)
+    u = {"plane": np.repeat(rng.choice([-0.5, 0.0, 0.5], 15), 10)}
+    true = tilt(
+        {name: np.array([size]) for name, size in (("trim", 3.0), ("plane", 1.0), ("lag", 1.0))}, u, time
+    )
+    y = -true["tilt"][:, 0] + 0.1 * rng.standard_normal(150)
+    (found,) = sd.diagnose(sd.Record(time, {"tilt": y, **u}), model).named
+    assert found.id == "unit:tilt"
+    assert found.estimates[0].value == -1.0
+
+
+def test_a_step_may_be_far_larger_than_what_a_zero_is_off_by():
+    """41 readings of a sensor whose zero is set to a sixth of its noise; from 24 s on it shows 30 levels too little."""
+    rng, time, noise = np.random.default_rng(2), 1.0 * np.arange(41), 0.3
+    model = sd.Model(
+        lambda p, u, t: {"y": p["size"] * np.sin(t / 4.0)},
+        {"y": sd.Sensor(noise=noise, zero=0.05, unit="deg/s")},
+        parameters=[sd.Number("size", 5.0, tolerance=0.2)],
+        causes=[sd.Cause("size", "it moves more or less", changes={"size": 1.0})],
+    )
+    y = 5.0 * np.sin(time / 4.0) + noise * rng.standard_normal(41) - 9.0 * (time >= 24.0)
+    (found,) = sd.diagnose(sd.Record(time, {"y": y}), model).named
+    assert found.id == "offset:y@0"
+    (size,) = found.estimates
+    assert abs(size.value + 9.0) < 3.0 * size.sd
 
 
 @pytest.mark.parametrize("at", [8.0, 15.0, 21.0])

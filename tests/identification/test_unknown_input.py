@@ -403,15 +403,19 @@ def test_a_force_that_is_slower_than_a_short_record_is_judged_all_the_same(sampl
 
 
 def said(*explanations):
-    """Return what is said of explanations with their probabilities, the rest to 1 unseen: term, p, alternatives."""
+    """Return what is said of explanations with their probabilities, the rest to 1 unseen: term, p, alternatives.
+
+    Terms are named by kind and target; a unit by its factor, too.
+    """
     from types import SimpleNamespace
 
     from subzero.identification.explanation import Term
     from subzero.identification.named_terms import said_of
 
     def term(name):
-        kind, _, target = name.partition(":")
-        return Term(name, name, kind, target.partition("@")[0])
+        kind, target, *factor = name.split(":")
+        id = f"{kind}:{target}"
+        return Term(id, id, kind, target.partition("@")[0], factor=float(factor[0]) if factor else 1.0)
 
     ranked = [SimpleNamespace(terms=tuple(map(term, names))) for names, _ in explanations]
     found = said_of(ranked, np.array([p for _, p in explanations]))
@@ -428,6 +432,19 @@ def test_where_a_drift_or_a_force_explains_a_record_it_is_said_that_one_of_them_
     # Throughout or for a time, the same input acts.
     (found,) = said((push, 0.6), (["unknown:push"], 0.38))
     assert found == ("unknown:push@0", pytest.approx(1.0), ["unknown:push@0"])
+
+
+def test_a_cause_that_begins_at_some_time_bears_out_that_cause_but_not_the_other_way_round():
+    always, later = ["cause:drag"], ["cause:drag@12"]
+    (found,) = said((always, 0.7), (later, 0.25), ([], 0.05))
+    assert found == ("cause:drag", pytest.approx(0.95), ["cause:drag"])
+    (found,) = said((later, 0.7), (always, 0.25), ([], 0.05))
+    assert found == ("cause:drag@12", pytest.approx(0.7), ["cause:drag@12"])
+
+
+def test_two_units_of_a_channel_have_each_its_own_probability():
+    (found,) = said((["unit:depth:3.28"], 0.7), (["unit:depth:0.1"], 0.3))
+    assert found == ("unit:depth", pytest.approx(0.7), ["unit:depth"])
 
 
 def test_of_two_things_that_change_each_has_its_own_probability():
