@@ -362,7 +362,7 @@ def fit(problem: Problem, start: Linear, least: float = -np.inf) -> Fit:
         if linear.evidence(problem)[1] < least:
             best = linear if score == -np.inf else best
             break
-        linear = _stepped(problem, linear)
+        linear = stepped(problem, linear)
         if not _is_linear(problem, origin, linear):
             linear = origin = linearised(problem, linear.terms, linear.entries, linear.x, linear.levels)
         now = _laplace(problem, linear)[0]
@@ -431,7 +431,7 @@ def free_fit(
             name: replace(each, white=max(each.white, before[name]))
             for name, each in linear.levels.noise.items()
         }
-        there = _stepped(free, replace(linear, levels=Levels(noise, linear.levels.sizes)))
+        there = stepped(free, replace(linear, levels=Levels(noise, linear.levels.sizes)))
         linear = replace(there, levels=linear.levels)
         if not _is_linear(free, origin, there):
             linear = origin = linearised(free, terms, entries, there.x, linear.levels)
@@ -457,14 +457,10 @@ def _approached(problem: Problem, linear: Linear) -> tuple[Linear, Linear]:
     """
     origin = linear
     for _ in range(ROUNDS):
-        left = _left(problem, linear)
-        tempered = {
-            name: replace(each, white=max(each.white, TEMPER * left[name]))
-            for name, each in linear.levels.noise.items()
-        }
-        if tempered == linear.levels.noise:
+        left, levels = _left(problem, linear), tempered(problem, linear)
+        if levels == linear.levels:
             break
-        there = _stepped(problem, replace(linear, levels=Levels(tempered, linear.levels.sizes)))
+        there = stepped(problem, replace(linear, levels=levels))
         now = _left(problem, there)
         ends = all(now[name] > (1.0 - APPROACHING) * left[name] for name in left)
         if ends and sum(now.values()) > sum(left.values()):
@@ -475,6 +471,16 @@ def _approached(problem: Problem, linear: Linear) -> tuple[Linear, Linear]:
         if ends:
             break
     return linear, origin
+
+
+def tempered(problem: Problem, linear: Linear) -> Levels:
+    """Return the levels of a point with as much noise as suits a linear problem there: a share of the residual."""
+    left = _left(problem, linear)
+    noise = {
+        name: replace(each, white=max(each.white, TEMPER * left[name]))
+        for name, each in linear.levels.noise.items()
+    }
+    return replace(linear.levels, noise=noise)
 
 
 def linearised(
@@ -492,7 +498,7 @@ def linearised(
     return Linear(terms, entries, x, {name: column[:, 0] for name, column in e.items()}, J, levels)
 
 
-def _stepped(problem: Problem, linear: Linear) -> Linear:
+def stepped(problem: Problem, linear: Linear) -> Linear:
     """Return the problem after Gauss-Newton steps, each shortened until it gains; sensitivities learn from each."""
     at, low_high = linear, bounds(linear.entries)
     cost = _negative_log_posterior(problem, at)

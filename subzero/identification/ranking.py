@@ -25,7 +25,7 @@ from subzero.identification.explanation import (
     unknown_terms,
     with_term,
 )
-from subzero.identification.fit import Levels, Linear, fitted_levels, levels_under, quieter
+from subzero.identification.fit import Levels, Linear, fitted_levels, levels_under, quieter, stepped, tempered
 from subzero.identification.problem import CORRECTIONS, Problem
 
 MOST_TERMS = 8
@@ -246,6 +246,17 @@ class Ranking:
                 break
             before, here = added[0]
         return here
+
+    def nearest(self, nominal: Linear) -> Linear | None:
+        """Return the nominal model with the one term more with which the first step of a fit leads closest to records
+        that are far: a rank is of the linear problem, which does not hold there. None if there is no term.
+        """
+        added = [linear for _, linear in self.additions(nominal, self.terms)]
+        made = [replace(each, levels=tempered(self.problem, each)) for each in added]
+        ranked = distinct(sorted(((self.score(each), each) for each in made), key=lambda pair: -pair[0]))
+        steps = [(stepped(self.problem, each), each) for _, each in ranked[:RANKED_AGAIN]]
+        _, found = max(steps, key=lambda pair: self.own_score(pair[0]), default=(None, None))
+        return found and replace(found, levels=levels_under(self.problem, found.terms, nominal))
 
     def best_unknown(self, base: Linear) -> list[tuple[float, Linear]]:
         """Return explanations with one unknown input more with their scores, ranked with their own noise."""

@@ -202,13 +202,13 @@ class Search:
 
     def _fit_first(self, nominal: Linear) -> None:
         """Fit the gross errors in the data that gain most at the nominal model; where they do not explain the records,
-        and a single term is ranked higher there, fit that one, and what gross errors there are with it.
+        the one term that leads closest to these, and if need be what gross errors there are with it.
         """
-        gross = self.ranking.with_gross_errors(nominal)
-        if not follows(self.problem, self._fit(gross)):
-            ranked = self.ranking.additions(nominal, self.ranking.terms)
-            if ranked and ranked[0][0] > self.ranking.score(gross):
-                self._fit(self.ranking.with_gross_errors(ranked[0][1]))
+        if follows(self.problem, self._fit(self.ranking.with_gross_errors(nominal))):
+            return
+        first = self.ranking.nearest(nominal)
+        if first and not follows(self.problem, self._fit(first)):
+            self._fit(self.ranking.with_gross_errors(first))
 
     def _run(self, with_outliers: bool) -> None:
         """Search; where the time or the number of fits does not suffice, an unknown input is tried all the same."""
