@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from subzero.identification.explanation import kinds_of
+from subzero.identification.explanation import CLOCK, kinds_of
 from subzero.identification.fit import Fit
 from subzero.identification.problem import Problem
 
@@ -176,9 +176,11 @@ def rests_on_histories(problem: Problem, fitted: Fit) -> bool:
 
 def witnesses(problem: Problem, fitted: Fit) -> set[str]:
     """Return the channels of which a model explains more than half without unknown inputs and drifts, with no error in
-    their data but a known unit.
+    their data but a known unit: none if their clock has one, which moves all of them to suit the model.
     """
     soft = {term.target for term in fitted.terms if term.is_data_error and term.kind != "unit"}
+    if CLOCK in soft:
+        return set()
     return {
         name
         for name, _, share in _unexplained(problem, fitted)

@@ -234,3 +234,32 @@ def test_a_unit_is_named_only_if_the_factor_is_seen_or_another_channel_agrees(kn
         columns["speed"] = 0.05 * time + 0.05 * rng.standard_normal(40)
     verdict = sd.diagnose(sd.Record(time, columns), model)
     assert [each.id for each in verdict.named] == ["unit:depth"] * known
+
+
+def test_no_channel_bears_witness_to_a_unit_where_their_clock_was_moved_to_suit_the_model():
+    from subzero.identification.candidates import declared
+    from subzero.identification.fit import fit, starting_point
+    from subzero.identification.nearness import witnesses
+    from subzero.identification.problem import Problem
+
+    time, rng = 0.1 * np.arange(200), np.random.default_rng(0)
+    model = sd.Model(
+        lambda p, u, t: {name: p["gain"] * np.sin(t + shift) for shift, name in enumerate("abc")},
+        {name: sd.Sensor(noise=0.05, unit="m") for name in "abc"},
+        parameters=[sd.Number("gain", 1.0, tolerance=0.02)],
+    )
+    true = model.simulate({"gain": 1.0}, {}, time)
+    columns = {
+        name: x / (0.3048 if name == "a" else 1.0) + 0.05 * rng.standard_normal(200)
+        for name, x in true.items()
+    }
+    problem = Problem(model, [sd.Record(time, columns)])
+    unit, clock = (
+        next(each for each in declared(problem) if each.id == id and (each.factor > 3.0) == (id == "unit:a"))
+        for id in ("unit:a", "delay:clock")
+    )
+    found = [
+        witnesses(problem, fit(problem, starting_point(problem, terms, {})))
+        for terms in ((unit,), (clock, unit))
+    ]
+    assert found == [{"a", "b", "c"}, set()]
