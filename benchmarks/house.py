@@ -46,7 +46,7 @@ FACES = {
 }
 FACES |= {"subzero.diagnosis.report"}
 """Modules that tests of a package may import."""
-COMPILERS = {"compiled", "inner", "inlined", "allocating", "intrinsic"}
+COMPILERS = {"compiled", "inner", "inlined", "expanded", "allocating", "intrinsic"}
 MOST_PARAMETERS = 7
 SHORT_LINES = 80
 TABLES = ("subzero.diagnosis.hypothesis.catalogue",)

@@ -50,8 +50,8 @@ def said_of(ranked: Sequence[Fit], probabilities: np.ndarray) -> Iterator[Said]:
         for term in each.terms:
             what = _what(term)
             terms.setdefault(what, term)
-            for said in {what, what.partition("@")[0]}:
-                own[said] = own.get(said, 0.0) + p
+            for claim in {what, what.partition("@")[0]}:
+                own[claim] = own.get(claim, 0.0) + p
     anything = sum(p for each, p in every if any(map(_varies, each.terms)))
     single = sum(map(_varies, ranked[0].terms)) == 1
     for term in ranked[0].terms:
