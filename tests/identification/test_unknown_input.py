@@ -442,9 +442,11 @@ def test_a_cause_that_begins_at_some_time_bears_out_that_cause_but_not_the_other
     assert found == ("cause:drag@12", pytest.approx(0.7), ["cause:drag@12"])
 
 
-def test_two_units_of_a_channel_have_each_its_own_probability():
-    (found,) = said((["unit:depth:3.28"], 0.7), (["unit:depth:0.1"], 0.3))
-    assert found == ("unit:depth", pytest.approx(0.7), ["unit:depth"])
+def test_units_of_a_channel_that_are_not_distinguished_are_said_together():
+    (found,) = said((["unit:depth:10.0"], 0.7), (["unit:depth:10.06"], 0.28), (["unit:depth:9.0"], 0.02))
+    assert found == ("unit:depth", pytest.approx(0.98), ["unit:depth", "unit:depth"])
+    (found,) = said((["unit:depth:10.0"], 0.95), (["unit:depth:10.06"], 0.05))
+    assert found == ("unit:depth", pytest.approx(0.95), ["unit:depth"])
 
 
 def test_of_two_things_that_change_each_has_its_own_probability():
