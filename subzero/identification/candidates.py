@@ -104,7 +104,9 @@ def suggested(problem: Problem, linear: Linear, terms: list[Term]) -> list[Term]
 def _of_channel(
     problem: Problem, linear: Linear, name: str, own: list[Term], others: Sequence[_Others]
 ) -> Iterator[Term]:
-    """Yield errors of a channel: known ones that bring it closer, the regression, those from some time on, runs."""
+    """Yield errors of a channel: known ones that bring it closer, at the point or where numbers follow it, the
+    regression, those from some time on, runs.
+    """
     each, used = problem.readings_of(name, linear.terms), problem.used(name, linear.terms)
     e, level, turn = linear.e[name], problem.levels(linear.terms)[name], problem.model.channels[name].turn
     simulated = problem.recorded(name, linear.terms) - e
@@ -113,12 +115,13 @@ def _of_channel(
     soft = [term for term in own if term.kind == "offset" and not problem.model.always]
     for rest in others if soft else ():
         yield from _step(rest, name, soft[0])
-    if float(np.mean(e[used] ** 2)) < (OFF_LEVELS * level) ** 2:
+    before = float(np.mean(e[used] ** 2))
+    if before < (OFF_LEVELS * level) ** 2:
         return
     known, follow = [term for term in own if term.kind == "unit"], _Followed(problem, linear, name)
     for term in known:
         now = _wrapped((each.values - term.offset) / term.factor - simulated, turn)
-        if follow.left(now) < follow.left(e):
+        if float(np.mean(now[used] ** 2)) < before or follow.left(now) < follow.left(e):
             yield term
     if (affine := _regression(problem, name, simulated, each.values, used)) is not None:
         yield affine
@@ -176,14 +179,15 @@ def _log_left(problem: Problem, name: str, terms: Terms, e: np.ndarray) -> float
 def _swapped(problem: Problem, linear: Linear, terms: list[Term]) -> Iterator[Term]:
     """Yield pairs of channels that are closer to the simulation of each other than to their own."""
     for term in (term for term in terms if term.kind == "swapped"):
-        there, left = with_term(linear.terms, term), 0.0
+        there, left, followed = with_term(linear.terms, term), 0.0, 0.0
         for name in (term.target, term.partner):
-            own = problem.recorded(name, linear.terms)
-            e = linear.e[name] + problem.recorded(name, there) - own
+            before, own = linear.e[name], problem.recorded(name, linear.terms)
+            e = before + problem.recorded(name, there) - own
             e = _wrapped(e, problem.model.channels[name].turn)
+            left += _log_left(problem, name, there, e) - _log_left(problem, name, linear.terms, before)
             follow = _Followed(problem, linear, name)
-            left += np.log(follow.left(e) / follow.left(linear.e[name]))
-        if left < 0.0:
+            followed += np.log(follow.left(e) / follow.left(before))
+        if min(left, followed) < 0.0:
             yield term
 
 

@@ -71,12 +71,11 @@ def quieter(problem: Problem, terms: Terms, levels: Levels) -> Levels:
 
 
 def levels_under(problem: Problem, terms: Terms, linear: Linear) -> Levels:
-    """Return the levels of a point for another explanation, which may undo other units."""
-    before, after = problem.levels(linear.terms), problem.levels(terms)
+    """Return the levels of a point for another explanation, which may undo other units; rounding is no part of them."""
     noise = {
         name: replace(each, white=each.white * ratio, slow=each.slow * ratio)
         for name, each in linear.levels.noise.items()
-        for ratio in [after[name] / before[name]]
+        for ratio in [problem.prior(name, terms).level / problem.prior(name, linear.terms).level]
     }
     return replace(linear.levels, noise=noise)
 

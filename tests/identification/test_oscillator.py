@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import subzero.diagnosis as sd
-from tests.identification.oscillator import model, record
+from tests.identification.oscillator import NOISE, model, record
 
 
 def estimate(verdict, name):
@@ -71,6 +71,19 @@ def test_a_unit_is_named_whatever_the_parameters_would_bend(factor, words):
     verdict = sd.diagnose(changed(seen, x=factor * seen.columns["x"]), model())
     assert [each.id for each in verdict.named] == ["unit:x"]
     assert words in verdict.named[0].sentence
+
+
+@pytest.mark.parametrize("step", [0.02, 0.05])
+def test_a_unit_of_coarse_readings_is_named(step):
+    """Rounded to twice or five times the noise of the sensor, and written in hundredths."""
+    seen = record(3)
+    x = 100.0 * step * np.round(seen.columns["x"] / step)
+    verdict = sd.diagnose(
+        changed(seen, x=x), model(unknown=False, channels={"x": sd.Sensor(noise=NOISE, unit="deg")})
+    )
+    (found,) = verdict.named
+    assert found.id == "unit:x"
+    assert found.estimates[0].value == 100.0
 
 
 @pytest.mark.long
