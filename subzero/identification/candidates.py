@@ -119,9 +119,10 @@ def _of_channel(
     if before < (OFF_LEVELS * level) ** 2:
         return
     known, follow = [term for term in own if term.kind == "unit"], _Followed(problem, linear, name)
+    followed = follow.left(e)
     for term in known:
         now = _wrapped((each.values - term.offset) / term.factor - simulated, turn)
-        if float(np.mean(now[used] ** 2)) < before or follow.left(now) < follow.left(e):
+        if float(np.mean(now[used] ** 2)) < before or follow.left(now) < followed:
             yield term
     if (affine := _regression(problem, name, simulated, each.values, used)) is not None:
         yield affine
@@ -130,9 +131,10 @@ def _of_channel(
 
 
 class _Followed:
-    """What residuals of a channel leave in the linear problem where its numbers follow them, as far as priors let them.
+    """What residuals e of a channel leave where the numbers θ of the linear problem follow them, as far as their prior
+    N(c, D) lets them.
 
-        min |r − F z|² + |z + z₀|²,   F = J D^½ / level,  z₀ = D^-½ (θ − c)
+        min over z of |r − F z|² + |z + z₀|²,   r = e / level,  F = J D^½ / level,  z₀ = D^-½ (θ − c)
 
     A nominal model may be farther from right readings than from wrong ones: from pitch of 2°, where it has −0.5°.
     """
@@ -177,16 +179,20 @@ def _log_left(problem: Problem, name: str, terms: Terms, e: np.ndarray) -> float
 
 
 def _swapped(problem: Problem, linear: Linear, terms: list[Term]) -> Iterator[Term]:
-    """Yield pairs of channels that are closer to the simulation of each other than to their own."""
-    for term in (term for term in terms if term.kind == "swapped"):
+    """Yield pairs of channels that are closer to the simulation of each other than to their own, at the point or where
+    numbers follow them.
+    """
+    pairs = [term for term in terms if term.kind == "swapped"]
+    names = {name for term in pairs for name in (term.target, term.partner)}
+    follow = {name: _Followed(problem, linear, name) for name in names}
+    for term in pairs:
         there, left, followed = with_term(linear.terms, term), 0.0, 0.0
         for name in (term.target, term.partner):
             before, own = linear.e[name], problem.recorded(name, linear.terms)
             e = before + problem.recorded(name, there) - own
             e = _wrapped(e, problem.model.channels[name].turn)
             left += _log_left(problem, name, there, e) - _log_left(problem, name, linear.terms, before)
-            follow = _Followed(problem, linear, name)
-            followed += np.log(follow.left(e) / follow.left(before))
+            followed += np.log(follow[name].left(e) / follow[name].left(before))
         if min(left, followed) < 0.0:
             yield term
 

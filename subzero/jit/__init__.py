@@ -3,7 +3,7 @@
 name                                            purpose                                               file
 ----------------------------------------------  ----------------------------------------------------  ------------
 compiled, allocating, inner, inlined,
-expanded, gated_inlined, by_field …            how a function is compiled                            decorators
+expanded, gated_inlined, by_field …             how a function is compiled                            decorators
 Record, made_once                               numbers as one record in memory, a single pointer     record
 scratch                                         a small array on the stack of a compiled function     intrinsics
 add, exchange                                   whole numbers that threads change together            intrinsics

@@ -62,8 +62,8 @@ def inlined(function: Function) -> Function:
 def expanded(function: Function) -> Function:
     """Write a function out in its callers before they are compiled: for a long one with one or two of them.
 
-    The compiler optimises a function together with all that it calls, and does so again for each caller: of the five
-    functions around the step of a cable this saves a quarter of the first compilation.
+    The compiler optimises a function together with all that it calls, and does so again for the caller: a chain of five
+    functions around the step of a cable would be optimised five times. Only compiled code may call it.
     """
     return _compile(function, InnerKernel, inline="always")
 

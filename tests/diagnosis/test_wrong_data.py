@@ -77,6 +77,14 @@ def test_a_current_that_is_twice_as_strong_delays_no_channel():
 
 
 @pytest.mark.slow
+def test_a_cause_that_takes_the_vehicle_far_away_is_no_error_of_three_sensors():
+    """A vehicle that floats: at the nominal numbers three wrong units are ranked far above it, and explain less."""
+    verdict = subzero.diagnose(data_errors.made(*data_errors.drawn(9101, 6)[5]).logged, budget="verdict")
+    assert not verdict.data_errors
+    assert [cause.id for cause in verdict.causes] == ["net_buoyancy"]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("seed", "index"),
     [(8301, 3),  # a heading that drifts by 2 degrees: its other sign was 25 nats ahead, and is 7 behind in a search
