@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from itertools import chain
 from math import cos, degrees, pi, radians, sin
 from typing import Any
 
@@ -53,14 +52,13 @@ LIMITS = {
     "cable length [m]": (0.0, 1000.0),
 }
 """The observed channels, in this order, with the limits of the observation space."""
+LOW, HIGH = np.array(list(LIMITS.values()), dtype=np.float32).T.copy()
 TRUTH = ("wanted_heading", *Observation._fields)
 """The contents of an info: the reference heading [rad], and the true values."""
-NAMES = (*TRUTH, *(f"_{name}" for name in TRUTH))
-"""The same of many environments: in arrays, and that each environment has it."""
 HEADING = Observation._fields.index("heading")
-FELT = [
-    Observation._fields.index(name) for name in ("yaw_rate", "surge_speed", "rudder_angle", "cable_length")
-]
+FELT = np.array(
+    [Observation._fields.index(name) for name in ("yaw_rate", "surge_speed", "rudder_angle", "cable_length")]
+)
 """Places of true values that are observed as they are."""
 
 
@@ -80,6 +78,7 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
     Attributes:
         simulator: the simulation.
         wanted: the heading to turn to. [rad]
+        taken: steps of the episode so far.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}  # noqa: RUF012  # as Gymnasium declares it
@@ -99,10 +98,9 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         self.metadata = self.metadata | {"render_fps": round(1.0 / self.simulator.sample_time)}
         self._propeller = float(propeller_rps)
         self._most = float(self.simulator.model.vehicle.rudder_servo.deflection_limit)
-        low, high = np.array(list(LIMITS.values()), dtype=np.float32).T
-        self.observation_space = gymnasium.spaces.Box(low, high, dtype=np.float32)
+        self.observation_space = gymnasium.spaces.Box(LOW, HIGH, dtype=np.float32)
         self.action_space = gymnasium.spaces.Box(-1.0, 1.0, (1,), dtype=np.float32)
-        self.wanted, self._taken = 0.0, 0
+        self.wanted, self.taken = 0.0, 0
 
     @checked_arguments
     def reset(
@@ -113,14 +111,16 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         drawn = self.np_random.uniform(-LARGEST_TURN, LARGEST_TURN)
         turn = checked("TetheredHeading.reset", "turn", (options or {}).get("turn", drawn), unit="rad")
         self.wanted = self.simulator.reset().heading + turn
-        self._taken = 0
+        self.taken = 0
         return self._observed(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
         """Hold the rudder for one sample time."""
-        (share,) = _shares(action, 1)
-        stopped = self.hold(share)
-        return self._observed(), self.reward(self._error, share), stopped, self.is_over, self._info()
+        shares = _shares(action, 1)
+        stopped = self.hold(self.orders(shares)[0])
+        error = np.array([self._error])
+        reward = float(_rewards(error, shares, self.simulator.sample_time)[0])
+        return self._observed(), reward, stopped, self.taken >= STEPS, self._info()
 
     def render(self) -> Any:
         """Return the way, the cable, the tow point and the wanted heading from above (height, width, 3), or None."""
@@ -146,34 +146,20 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
         canvas.draw()
         return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
-    def hold(self, share: float) -> bool:
-        """Hold the rudder at a share of its limit for one sample time; return whether the simulation stopped."""
+    def hold(self, order: np.ndarray) -> bool:
+        """Hold a command (4,) for one sample time; return whether the simulation stopped."""
+        self.taken += 1
         try:
-            self.simulator.hold(*self.order(np.array([share]))[0].tolist())
-            stopped = False
+            self.simulator.hold(*order.tolist())
         except RunStoppedError:
-            stopped = True
-        self.count()
-        return stopped
+            return True
+        return False
 
-    def count(self) -> None:
-        """Count a step of the episode."""
-        self._taken += 1
-
-    def order(self, shares: np.ndarray) -> np.ndarray:
+    def orders(self, shares: np.ndarray) -> np.ndarray:
         """Return commands with the rudder at shares of its limit (n,): propeller [rev/s], three fins [rad] (n, 4)."""
         orders = np.zeros((shares.size, 4))
         orders[:, 0], orders[:, 1] = self._propeller, self._most * shares + 0.0  # no negative zero
         return orders
-
-    def reward(self, error: float, share: float) -> float:
-        """Return the reward of a sample time: heading error at its end [rad], rudder as a share of its limit."""
-        return -(error**2 + RUDDER_PRICE * share**2) * self.simulator.sample_time
-
-    @property
-    def is_over(self) -> bool:
-        """Whether the episode has had all its steps."""
-        return self._taken >= STEPS
 
     @property
     def seen(self) -> Observation:
@@ -187,27 +173,37 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _observed(self) -> np.ndarray:
         """Return the observation of the agent, within the limits of its space."""
-        space: Any = self.observation_space
-        felt = sin(self._error), cos(self._error), *self.simulator.seen[FELT].tolist()
-        return np.clip(np.array(felt, dtype=np.float32), space.low, space.high)
+        return _observations(np.array([self._error]), self.simulator.seen[None])[0]
 
     def _info(self) -> dict[str, Any]:
         """Return the whole truth, by name, and the heading that is wanted [rad]."""
         return dict(zip(TRUTH, (self.wanted, *self.simulator.seen.tolist()), strict=True))
 
 
-def _shares(actions: Any, count: int) -> list[float]:
-    """Return so many rudders, each as a share of its limit; raise an error for others; plain code, as it is in
-    loops.
-    """
+def _shares(actions: Any, count: int) -> np.ndarray:
+    """Return so many rudders (count,), each as a share of its limit; raise an error for others."""
     try:
         if not isinstance(actions, Sequence) or len(actions) == count:
             given = np.asarray(actions)
             if given.size == count and given.dtype.kind in "iuf" and not np.isnan(given).any():
-                return [min(max(float(share), -1.0), 1.0) for share in given.reshape(-1).tolist()]
+                return np.minimum(np.maximum(given.reshape(-1).astype(float), -1.0), 1.0)
     except (TypeError, ValueError, OverflowError):
         pass
     raise BadValueError(f"The action is {short(actions)}; it must be {count} numbers from -1 to 1.")
+
+
+def _rewards(errors: np.ndarray, shares: np.ndarray, sample_time: float) -> np.ndarray:
+    """Return the rewards of a sample time (n,): heading errors at its end [rad], rudders as shares of their limits."""
+    rewards: np.ndarray = -(errors * errors + RUDDER_PRICE * shares * shares) * sample_time
+    return rewards
+
+
+def _observations(errors: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """Return what agents observe (n, 6), from heading errors (n,) [rad] and true values (n, 27)."""
+    felt: np.ndarray = np.empty((errors.size, len(LIMITS)), dtype=np.float32)
+    felt[:, 0], felt[:, 1] = np.sin(errors), np.cos(errors)
+    felt[:, 2:] = seen.take(FELT, axis=1)
+    return np.minimum(np.maximum(felt, LOW), HIGH)
 
 
 class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
@@ -230,48 +226,37 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         workers = (os.cpu_count() or 1) if workers is None else workers
         threads = min(whole("TetheredHeadings: workers", workers, least=1), num_envs)
         self._group = SteppingGroup([our.simulator for our in self._ours], threads)
+        self._known = dict.fromkeys([f"_{name}" for name in TRUTH], np.ones(num_envs, dtype=bool))
 
     def step(
         self, actions: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Hold each rudder for one sample time, (num_envs, 1); return the same in arrays as each environment does."""
-        rudders = _shares(actions, self.num_envs)
+        shares, ours = _shares(actions, self.num_envs), self._ours
         held = self._held_one_by_one if self._autoreset_envs.any() else self._held
-        ended, seen = held(rudders)
-        wanted = np.array([our.wanted for our in self._ours])
-        errors = (wanted - seen[:, HEADING]).tolist()
-        rewards = np.array(list(map(self._ours[0].reward, errors, rudders)))
+        ended, seen = held(ours[0].orders(shares))
+        wanted = np.array([our.wanted for our in ours])
+        errors = wanted - seen[:, HEADING]
+        rewards = _rewards(errors, shares, ours[0].simulator.sample_time)
         rewards[self._autoreset_envs] = 0.0
-        cut = np.array([our.is_over for our in self._ours])
+        cut = np.array([our.taken for our in ours]) >= STEPS
         self._autoreset_envs = ended | cut
-        return self._observed(errors, seen), rewards, ended, cut, self._infos(wanted, seen)
+        infos = dict(zip(TRUTH, [wanted, *seen.T.copy()], strict=True))
+        return _observations(errors, seen), rewards, ended, cut, infos | self._known
 
-    def _held(self, rudders: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    def _held(self, orders: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Step all environments, side by side; return which simulations stopped, and the true values."""
         for our in self._ours:
-            our.count()
-        return self._group.hold(self._ours[0].order(np.array(rudders)))
+            our.taken += 1
+        return self._group.hold(orders)
 
-    def _held_one_by_one(self, rudders: list[float]) -> tuple[np.ndarray, np.ndarray]:
+    def _held_one_by_one(self, orders: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Step the environments, and start those again whose episode is over; return the same."""
         for i in np.flatnonzero(self._autoreset_envs):
             self._ours[i].reset()
-        each = zip(self._ours, rudders, self._autoreset_envs.tolist(), strict=True)
-        stopped = [not again and our.hold(share) for our, share, again in each]
+        each = zip(self._ours, orders, self._autoreset_envs.tolist(), strict=True)
+        stopped = [not again and our.hold(order) for our, order, again in each]
         return np.array(stopped), np.array([our.simulator.seen for our in self._ours])
-
-    def _observed(self, errors: list[float], seen: np.ndarray) -> np.ndarray:
-        """Return the observations of the agents, within the limits of their space (num_envs, 6)."""
-        space: Any = self.observation_space
-        felt: np.ndarray = np.empty(space.shape, dtype=np.float32)
-        felt[:, :2] = [(sin(error), cos(error)) for error in errors]
-        felt[:, 2:] = seen[:, FELT]
-        return felt.clip(space.low, space.high)
-
-    def _infos(self, wanted: np.ndarray, seen: np.ndarray) -> dict[str, Any]:
-        """Return the truth of all by name, (num_envs,) each; and by the name with _ before it, that each has it."""
-        known = np.ones((len(TRUTH), self.num_envs), dtype=bool)
-        return dict(zip(NAMES, chain([wanted], seen.T.copy(), known), strict=True))
 
     def close_extras(self, **kwargs: Any) -> None:
         """End the threads."""
