@@ -28,7 +28,7 @@ from subzero.identification.explanation import (
     with_term,
 )
 from subzero.identification.fit import Linear, Products, quieter, spreads
-from subzero.identification.noise import Filter
+from subzero.identification.noise import Filter, level_of
 from subzero.identification.problem import Problem, Readings
 from subzero.identification.repeats import repeats
 
@@ -51,7 +51,9 @@ BEGINS_TRIED = 100
 CAPPED = 25.0
 """Squared residual, in levels of the sensor, beyond which a reading says no more about when an error begins. [-]"""
 OFF_LEVELS = 3.0
-"""A channel that is closer to the simulation, in levels of its sensor (root mean square), has no gross error."""
+"""A channel that is closer to the simulation, in levels of its sensor (root mean square), has no gross error; in levels
+of what its readings show, if that is less: in a unit that is far too large they are all near 0, and so is their noise.
+"""
 
 
 def declared(problem: Problem) -> list[Term]:
@@ -116,7 +118,8 @@ def _of_channel(
     for rest in others if soft else ():
         yield from _step(rest, name, soft[0])
     before = float(np.mean(e[used] ** 2))
-    if before < (OFF_LEVELS * level) ** 2:
+    shown = level_of(each.values[used], problem.prior(name, linear.terms).resolution)
+    if before < (OFF_LEVELS * min(level, shown)) ** 2:
         return
     known, follow = [term for term in own if term.kind == "unit"], _Followed(problem, linear, name)
     followed = follow.left(e)

@@ -212,20 +212,22 @@ class Ranking:
             return self._added[id(base)][1]
         additions = self.additions(base, self.terms)
         self.ranks[key(base.terms)] = {key(linear.terms): score for score, linear in reversed(additions)}
-        again = [self.with_own_noise(linear) for linear in self._worth_own_noise(additions)]
+        again = [self.with_own_noise(linear) for linear in self._worth_own_noise(base, additions)]
         found = distinct(sorted(again, key=lambda pair: -pair[0]))
         self._added[id(base)] = (base, found)  # kept with its base, so that no other can take its identity
         return found
 
-    def _worth_own_noise(self, ranked: list[tuple[float, Linear]]) -> Iterator[Linear]:
+    def _worth_own_noise(self, base: Linear, ranked: list[tuple[float, Linear]]) -> Iterator[Linear]:
         """Yield the best, ranked with the noise of the explanation that they are added to, and ranked with usual noise
         where that is less, from which their own is then sought: what a term would explain may be part of the former.
+        And all with a gross error more: one outlier, hidden in the wrong unit, puts it last with the noise of others.
         """
         calm = [replace(each, levels=quieter(self.problem, each.terms, each.levels)) for _, each in ranked]
         quiet = sorted(((self.score(each), each) for each in calm), key=lambda pair: -pair[0])
+        gross = [pair for pair in quiet if is_gross_kind(new_term(base, pair[1]))]
         levels: dict[Key, Levels] = {}
-        for order in (ranked, quiet):
-            for _, linear in distinct(order)[:RANKED_AGAIN]:
+        for some in (distinct(ranked)[:RANKED_AGAIN], distinct(quiet)[:RANKED_AGAIN], distinct(gross)):
+            for _, linear in some:
                 if levels.get(key(linear.terms)) != linear.levels:
                     yield linear
                 levels.setdefault(key(linear.terms), linear.levels)
@@ -269,7 +271,7 @@ class Ranking:
         found = sorted(((self.score(linear), linear) for linear in there), key=lambda pair: -pair[0])
         ranks = {key(each.terms): score for score, each in reversed(found)}
         self.ranks.setdefault(key(base.terms), {}).update(ranks)
-        again = [self.with_own_noise(linear) for linear in self._worth_own_noise(found)]
+        again = [self.with_own_noise(linear) for linear in self._worth_own_noise(base, found)]
         return distinct(sorted(again, key=lambda pair: -pair[0]))
 
     def _acting(self, base: Linear, term: Term) -> Iterator[Linear]:

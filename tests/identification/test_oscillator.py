@@ -86,6 +86,25 @@ def test_a_unit_of_coarse_readings_is_named(step):
     assert found.estimates[0].value == 100.0
 
 
+@pytest.mark.parametrize("factor, words", [(0.1, "ten times too small"), (0.01, "a hundred times too small")])
+def test_a_unit_that_is_too_large_is_named_where_the_motion_is_little_more_than_noise(factor, words):
+    """All readings are within the noise that the sensor is said to have, and two are outliers."""
+    seen, noise = record(2), 0.2
+    x = seen.columns["x"] + noise * np.random.default_rng(2).standard_normal(300)
+    x[[70, 150]] += [2.0, -1.5]
+    sensor = sd.Sensor(noise=noise, unit="deg")
+    verdict = sd.diagnose(changed(seen, x=factor * x), model(unknown=False, channels={"x": sensor}))
+    (found,) = verdict.named
+    assert found.id == "unit:x"
+    assert words in found.sentence
+
+
+def test_a_sensor_that_is_better_than_declared_has_no_error():
+    sensor = sd.Sensor(noise=20.0 * NOISE, unit="deg")
+    verdict = sd.diagnose(record(3), model(unknown=False, channels={"x": sensor}))
+    assert verdict.named == ()
+
+
 @pytest.mark.long
 def test_of_a_linear_model_the_sign_of_the_readings_or_of_the_input_is_not_decided():
     seen = record(1)
