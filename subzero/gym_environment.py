@@ -173,7 +173,8 @@ class TetheredHeading(gymnasium.Env[np.ndarray, np.ndarray]):
 
     def _observed(self) -> np.ndarray:
         """Return the observation of the agent, within the limits of its space."""
-        return _observations(np.array([self._error]), self.simulator.seen[None])[0]
+        felt: np.ndarray = _observations(np.array([self._error]), self.simulator.seen[None])[0]
+        return felt
 
     def _info(self) -> dict[str, Any]:
         """Return the whole truth, by name, and the heading that is wanted [rad]."""
@@ -186,7 +187,8 @@ def _shares(actions: Any, count: int) -> np.ndarray:
         if not isinstance(actions, Sequence) or len(actions) == count:
             given = np.asarray(actions)
             if given.size == count and given.dtype.kind in "iuf" and not np.isnan(given).any():
-                return np.minimum(np.maximum(given.reshape(-1).astype(float), -1.0), 1.0)
+                shares: np.ndarray = given.reshape(-1).astype(float).clip(-1.0, 1.0)
+                return shares
     except (TypeError, ValueError, OverflowError):
         pass
     raise BadValueError(f"The action is {short(actions)}; it must be {count} numbers from -1 to 1.")
@@ -203,7 +205,7 @@ def _observations(errors: np.ndarray, seen: np.ndarray) -> np.ndarray:
     felt: np.ndarray = np.empty((errors.size, len(LIMITS)), dtype=np.float32)
     felt[:, 0], felt[:, 1] = np.sin(errors), np.cos(errors)
     felt[:, 2:] = seen.take(FELT, axis=1)
-    return np.minimum(np.maximum(felt, LOW), HIGH)
+    return felt.clip(LOW, HIGH)
 
 
 class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
@@ -226,7 +228,9 @@ class TetheredHeadings(gymnasium.vector.SyncVectorEnv):
         workers = (os.cpu_count() or 1) if workers is None else workers
         threads = min(whole("TetheredHeadings: workers", workers, least=1), num_envs)
         self._group = SteppingGroup([our.simulator for our in self._ours], threads)
-        self._known = dict.fromkeys([f"_{name}" for name in TRUTH], np.ones(num_envs, dtype=bool))
+        every = np.ones(num_envs, dtype=bool)
+        every.flags.writeable = False  # all steps give the same one
+        self._known = dict.fromkeys([f"_{name}" for name in TRUTH], every)
 
     def step(
         self, actions: np.ndarray

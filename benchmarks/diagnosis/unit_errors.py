@@ -68,18 +68,19 @@ def _factor(name: str, rng: np.random.Generator) -> float:
 
 
 @app.default
-def benchmark(*, count: int = 200, seed: int = 1, workers: int = 2) -> None:
+def benchmark(*, count: int = 200, seed: int = 1, first: int = 0, workers: int = 2) -> None:
     """Diagnose logs with unit errors and print what is named.
 
     Args:
         count: how many logs.
         seed: of all logs.
+        first: number of the first one.
         workers: processes.
     """
     all_named = wrong = 0
     with ProcessPoolExecutor(workers) as pool:
         for index, (factors, said, complete, bad) in enumerate(
-            pool.map(planted, [seed] * count, range(count))
+            pool.map(planted, [seed] * count, range(first, first + count)), first
         ):
             all_named, wrong = all_named + complete, wrong + bad
             truth = ", ".join(f"{name} x {factor:.3g}" for name, factor in factors.items())

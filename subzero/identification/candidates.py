@@ -14,6 +14,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from subzero.identification.explanation import (
+    AFFINE,
     CLOCK,
     CLOCK_KINDS,
     GAIN_SCALE,
@@ -28,7 +29,7 @@ from subzero.identification.explanation import (
     with_term,
 )
 from subzero.identification.fit import Linear, Products, quieter, spreads
-from subzero.identification.noise import Filter, level_of
+from subzero.identification.noise import BINDING, Filter, level_of
 from subzero.identification.problem import Problem, Readings
 from subzero.identification.repeats import repeats
 
@@ -46,6 +47,8 @@ SOFT = 3.0
 ANY_FACTOR = 2e-3
 """Odds that a factor and an offset are those of a regression, which saw the data, over those of any error: their priors
 reach over four decades and a thousand levels, a term's own numbers over a tenth and sixty levels about them. [-]"""
+NOISES_TRIED = 41
+"""Sizes of the noise with which a unit is looked at. [-]"""
 BEGINS_TRIED = 100
 """So many times at which an error may begin are tried at once."""
 CAPPED = 25.0
@@ -117,19 +120,22 @@ def _of_channel(
     soft = [term for term in own if term.kind == "offset" and not problem.model.always]
     for rest in others if soft else ():
         yield from _step(rest, name, soft[0])
-    before = float(np.mean(e[used] ** 2))
+    before, units = float(np.mean(e[used] ** 2)), [term for term in own if term.kind == "unit"]
     shown = level_of(each.values[used], problem.prior(name, linear.terms).resolution)
-    if before < (OFF_LEVELS * min(level, shown)) ** 2:
-        return
-    known, follow = [term for term in own if term.kind == "unit"], _Followed(problem, linear, name)
-    followed = follow.left(e)
-    for term in known:
+    is_far = before >= (OFF_LEVELS * min(level, shown)) ** 2
+    follow = _Followed(problem, linear, name)
+    now_is = next((term.factor for term in linear.terms if term.slot == (AFFINE, name)), 1.0)
+    here = follow.log_density(e, now_is)
+    for term in units:
         now = _wrapped((each.values - term.offset) / term.factor - simulated, turn)
-        if float(np.mean(now[used] ** 2)) < before or follow.left(now) < followed:
+        nearer = is_far and float(np.mean(now[used] ** 2)) < before
+        if nearer or follow.log_density(now, term.factor) > here:
             yield term
+    if not is_far:
+        return
     if (affine := _regression(problem, name, simulated, each.values, used)) is not None:
         yield affine
-    for term in known:
+    for term in units:
         yield from _from_some_time(each, term, e, simulated, used, level, turn)
 
 
@@ -144,17 +150,38 @@ class _Followed:
 
     def __init__(self, problem: Problem, linear: Linear, name: str) -> None:
         sd, self._used = spreads(linear.entries, linear.levels), problem.used(name, linear.terms)
-        self._level = problem.levels(linear.terms)[name]
-        self._F, self._off = linear.J[name][self._used] * sd / self._level, linear.off / sd
-        self._factor = cho_factor(self._F.T @ self._F + np.eye(sd.size), lower=True)
+        self._level, self._spread = (
+            problem.levels(linear.terms)[name],
+            problem.prior(name, linear.terms).spread,
+        )
+        F = linear.J[name][self._used] * sd / self._level
+        self._squares, V = np.linalg.eigh(F.T @ F)
+        self._F, self._at_centre = F @ V, F @ (linear.off / sd)
 
     def left(self, e: np.ndarray) -> float:
         """Return the minimum for residuals of all readings (m,), per reading; NaN in gaps."""
+        square, along, count = self._projected(e)
+        return float(square - along @ (along / (self._squares + 1.0))) / count
+
+    def log_density(self, e: np.ndarray, factor: float) -> float:
+        """Return the log density of the readings, up to a constant, that are a factor too large where they have the
+        residuals e (m,); with the white noise σ, in levels, that suits them best. [nats]
+
+            − m log |b σ| − ½ min / σ² − ½ log|I + FᵀF/σ²| − ½ (log σ / spread)²
+        """
+        square, along, count = self._projected(e)
+        deviations = np.linspace(-BINDING, BINDING, NOISES_TRIED)
+        variance = np.exp(2.0 * self._spread * deviations)
+        left = square - np.sum(along**2 / (self._squares + variance[:, None]), axis=1)
+        size = np.sum(np.log1p(np.maximum(self._squares, 0.0) / variance[:, None]), axis=1)
+        log = -0.5 * (count * np.log(factor**2 * variance) + left / variance + size + deviations**2)
+        return float(np.max(log))
+
+    def _projected(self, e: np.ndarray) -> tuple[float, np.ndarray, int]:
+        """Return |q|², Fᵀq along the axes of FᵀF, and the number of readings; q: r where all numbers are at c."""
         known = np.isfinite(e[self._used])
-        r = np.where(known, e[self._used], 0.0) / self._level
-        g = self._F.T @ r - self._off
-        least = r @ r + self._off @ self._off - g @ cho_solve(self._factor, g)
-        return float(least / known.sum())
+        q = np.where(known, e[self._used] / self._level + self._at_centre, 0.0)
+        return float(q @ q), self._F.T @ q, int(known.sum())
 
 
 def _of_inputs(problem: Problem, linear: Linear, terms: list[Term]) -> Iterator[Term]:

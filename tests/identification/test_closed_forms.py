@@ -11,7 +11,7 @@ import pytest
 from scipy.stats import multivariate_normal
 
 import subzero.diagnosis as sd
-from subzero.identification.candidates import declared, suggested
+from subzero.identification.candidates import _Followed, declared, suggested
 from subzero.identification.explanation import data_terms
 from subzero.identification.fit import (
     Levels,
@@ -128,6 +128,30 @@ def test_the_evidence_does_not_depend_on_where_a_linear_model_is_linearised(prob
         for at in (0.0, 0.5, 1.0)
     ]
     assert np.ptp(found) < 1e-6
+
+
+@pytest.mark.parametrize("factor", [1.0, 0.1, -2.0])
+def test_what_numbers_can_follow_is_the_density_of_the_readings_in_their_unit(problem, factor):
+    """Readings y = b (h + e), all numbers at their prior: a Gaussian, with the noise that makes it and its own size
+    most probable. That is found on a grid, and near its maximum the density is flat to 0.1 nats.
+    """
+    entries = problem.entries(())
+    x = np.array([entry.centre for entry in entries]) + 0.3 * np.array([entry.sd for entry in entries])
+    linear = linearised(problem, (), entries, x, usual_levels(problem, ()))
+    J, prior = linear.J["y"], problem.prior("y", ())
+    y = problem.recorded("y", ())
+    e = y / factor - (y - linear.e["y"])
+    mean = (y - linear.e["y"]) - J @ linear.off
+    spread = J @ np.diag([entry.sd**2 for entry in entries]) @ J.T
+    sizes = prior.level * np.exp(prior.spread * np.linspace(-5.0, 5.0, 1001))
+    log = [
+        multivariate_normal.logpdf(y / factor, mean, spread + size**2 * np.eye(y.size))
+        - 0.5 * (np.log(size / prior.level) / prior.spread) ** 2
+        for size in sizes
+    ]
+    true = max(log) - y.size * np.log(abs(factor))
+    constant = -y.size * (np.log(prior.level) + 0.5 * np.log(2.0 * np.pi))
+    assert _Followed(problem, linear, "y").log_density(e, factor) + constant == pytest.approx(true, abs=0.1)
 
 
 def test_a_step_goes_to_the_mean_of_the_posterior(problem):
