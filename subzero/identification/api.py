@@ -143,8 +143,9 @@ def _concluded(search: Search, held_out: Sequence[Record], outliers: Mapping[str
     problem, ranked = search.problem, search.ranked()
     best, probabilities = ranked[0], _probabilities(search, ranked)
     free = free_fit(problem, best.terms, best.values, best.linear.levels.sizes)
-    near = nearness(problem, best, free)
-    own = locks(problem, best, held_out, settled=search.settled) if near.near else {}
+    near, budget = nearness(problem, best, free), _budget(search, best, free)
+    taken = {share.term: (share.before, share.after) for share in budget}
+    own = locks(problem, best, free, taken, held_out, settled=search.settled) if near.near else {}
     terms = [
         named_term(problem, best, said, own.get(said.term.id), near)
         for said in said_of(ranked, probabilities)
@@ -154,7 +155,6 @@ def _concluded(search: Search, held_out: Sequence[Record], outliers: Mapping[str
         each for each in terms if near.near and not each.against and each.probability >= NAMED_PROBABILITY
     )
     suspected = tuple(each for each in terms if each not in named)
-    budget = _budget(search, best, free)
     return Verdict(
         verdict=_kind(best, near, named, suspected, probabilities),
         nearness=near,

@@ -4,6 +4,9 @@ Of records that were held out the prediction must surely improve. Where the reco
 get worse by the noise of the sensors: other parameters may bend so far that a short last part looks the same. (Wider
 tolerances are a term of the search: what they explain as well is undecided there.)
 
+Where a free simulation leaves more than that of a near model, a term must take more of it than remains: what takes a
+little is how another error of the model looks.
+
     gain = Σ (e/ν)² without the term − Σ (e/ν)² with it     in free simulation of readings that were not fitted
 
 A history says nothing about another time: where an explanation has an unknown input, every second part of a record is
@@ -15,7 +18,7 @@ The interval of the gain is a bootstrap over blocks of time (Künsch 1989), as r
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -25,7 +28,7 @@ from scipy.special import ndtri
 from subzero.identification.explanation import CLOCK, Entry, Term, Terms, data_terms, without
 from subzero.identification.fit import Fit, Products, free_fit, spreads
 from subzero.identification.model import COMMAND
-from subzero.identification.nearness import rests_on_histories, witnesses
+from subzero.identification.nearness import beyond, rests_on_histories, witnesses
 from subzero.identification.problem import FEWEST_SAMPLES, Problem
 from subzero.identification.record import Record
 
@@ -42,6 +45,10 @@ explains a channel); so are equal readings. Another sign or a turn is not: a mod
 """
 BLOCKS, DRAWS, SURE = 20, 2000, 0.05
 """Blocks of a record, draws of the bootstrap, and the share of them outside an interval, to either side."""
+
+
+Taken = Mapping[str, tuple[float, float]]
+"""Term → what a free simulation leaves without and with it, after those before it. [levels of the sensors]"""
 
 
 @dataclass(frozen=True)
@@ -81,8 +88,25 @@ class Locks:
     reasons: tuple[str, ...]
 
 
-def locks(problem: Problem, best: Fit, held_out: Sequence[Record], *, settled: bool) -> dict[str, Locks]:
-    """Return the locks of every term of the best explanation, next to which all was tried or not: id → locks."""
+def locks(
+    problem: Problem,
+    best: Fit,
+    free: Fit,
+    taken: Taken,
+    held_out: Sequence[Record],
+    *,
+    settled: bool,
+) -> dict[str, Locks]:
+    """Return the locks of every term of the best explanation: id → locks.
+
+    Args:
+        problem: records and model.
+        best: the fit of the explanation.
+        free: that of the same in free simulation.
+        taken: what each term takes there.
+        held_out: records that no fit has seen.
+        settled: whether all next to the explanation was tried.
+    """
     terms, gap = [term for term in best.terms if term.kind != "tolerances"], _gap(problem, best.terms)
     split = _split(problem, held_out) if gap == math.inf else -math.inf
     tried = [term for term in terms if not _begins_too_late(term, split)]
@@ -94,12 +118,28 @@ def locks(problem: Problem, best: Fit, held_out: Sequence[Record], *, settled: b
     if others:
         gains |= _gains(problem, best, others, _folds(problem, held_out, split, gap))
     rests = _share_unknown(problem, terms) > MOST and rests_on_histories(problem, best)
-    doubted = _doubted(problem, best, rests=rests)
+    doubted, minor = _doubted(problem, best, rests=rests), _minor(taken, beyond(problem, free))
+    found = {}
+    for term in terms:
+        gain = gains.get(term.id)
+        reasons = [*_late_commands(problem, term), *doubted.get(term.id, ())]
+        if not (_is_plain(term) or (gain and gain.strict)):
+            reasons += minor.get(term.id, ())
+        found[term.id] = _locks(term, gain, reasons, settled)
+    return found
+
+
+def _minor(taken: Taken, remains: float) -> dict[str, list[str]]:
+    """Return term → that it takes less in free simulation than remains beyond what a near model leaves (mean square, in
+    squared levels).
+    """
     return {
-        term.id: _locks(
-            term, gains.get(term.id), [*_late_commands(problem, term), *doubted.get(term.id, ())], settled
-        )
-        for term in terms
+        term: [
+            f"it takes {before - after:.2f} of {before:.2f} levels of the sensors, and more remains than a near model "
+            "leaves"
+        ]
+        for term, (before, after) in taken.items()
+        if before**2 - after**2 < remains
     }
 
 

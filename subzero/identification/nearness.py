@@ -141,7 +141,7 @@ def _unlike(problem: Problem, fitted: Fit) -> Iterator[str]:
         name, each = term.target, problem.readings_of(term.target, fitted.terms)
         at = problem.where(each, term) & problem.used(name, fitted.terms)
         level, left = problem.levels(fitted.terms)[name], rms(found[name][at])
-        most = NEAR_LEFT * _most(problem, name, level)
+        most = most_left(problem, name, level)
         shown = problem.recorded(name, fitted.terms)[at]
         if problem.model.channels[name].angle or term.offset:  # its zero says nothing
             shown = shown - np.mean(shown)
@@ -156,7 +156,7 @@ def _unlike(problem: Problem, fitted: Fit) -> Iterator[str]:
 def _moves(problem: Problem, fitted: Fit, name: str) -> bool:
     """Return whether a channel shows more than noise about its mean."""
     shown = problem.recorded(name, fitted.terms)[problem.used(name, fitted.terms)]
-    return float(np.std(shown)) > NEAR_LEFT * _most(problem, name, problem.levels(fitted.terms)[name])
+    return float(np.std(shown)) > most_left(problem, name, problem.levels(fitted.terms)[name])
 
 
 def _without_histories(problem: Problem, fitted: Fit) -> dict[str, np.ndarray]:
@@ -169,7 +169,7 @@ def _without_histories(problem: Problem, fitted: Fit) -> dict[str, np.ndarray]:
 def rests_on_histories(problem: Problem, fitted: Fit) -> bool:
     """Return whether there is a channel of which a model explains less than half without unknown inputs and drifts."""
     return any(
-        share > EXPLAINED and left > NEAR_LEFT * _most(problem, name, problem.levels(fitted.terms)[name])
+        share > EXPLAINED and left > most_left(problem, name, problem.levels(fitted.terms)[name])
         for name, left, share in _unexplained(problem, fitted)
     )
 
@@ -203,16 +203,32 @@ def follows(problem: Problem, fitted: Fit) -> bool:
     """Return whether an explanation leaves no more of a channel than its sensor may err."""
     levels = problem.levels(fitted.terms)
     return all(
-        rms(fitted.linear.e[name][problem.used(name, fitted.terms)])
-        <= NEAR_LEFT * _most(problem, name, level)
+        rms(fitted.linear.e[name][problem.used(name, fitted.terms)]) <= most_left(problem, name, level)
         for name, level in levels.items()
         if name in problem.channels
     )
 
 
+def most_left(problem: Problem, name: str, level: float) -> float:
+    """Return the most that an explanation leaves of a channel if it is near, root mean square. [unit of the channel]"""
+    return NEAR_LEFT * _most(problem, name, level)
+
+
 def _most(problem: Problem, name: str, level: float) -> float:
     """Return the most that a sensor errs, as well as its level is known. [unit of the channel]"""
     return level * float(np.exp(problem.prior(name).spread))
+
+
+def beyond(problem: Problem, free: Fit) -> float:
+    """Return the mean square that a free simulation leaves beyond what a near explanation may, in squared levels."""
+    squares, counts = [], []
+    for name, level in problem.levels(free.terms).items():
+        if name in problem.channels:
+            used = problem.used(name, free.terms)
+            over = rms(free.linear.e[name][used]) ** 2 - most_left(problem, name, level) ** 2
+            squares.append(max(over, 0.0) / level**2)
+            counts.append(int(used.sum()))
+    return float(np.average(squares, weights=counts))
 
 
 def left_by(problem: Problem, fitted: Fit, free: Fit) -> list[Left]:

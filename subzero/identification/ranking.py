@@ -34,6 +34,8 @@ RANKED_AGAIN = 10
 """So many of the best are ranked again with their own noise."""
 GROSS = 100.0
 """An error in the data that gains more is a gross one. [nats]"""
+OF_INPUTS = ("input", "exchanged")
+"""Kinds of errors in what the simulation is given."""
 GROSS_KINDS = ("unit", "affine", "swapped", "input", "exchanged", "stuck")
 """Errors in the data that may be gross, as those of all channels' clock, unusual ones of the times of a channel, and
 those that begin in mid-record may."""
@@ -64,7 +66,7 @@ def new_term(base: Linear, linear: Linear) -> Term:
 
 def moving(terms: Terms) -> set[tuple[str, float]]:
     """Return the terms by which the simulation has other inputs, or a channel other readings."""
-    return {(term.id, term.factor) for term in terms if term.kind in ("swapped", "input", "exchanged")}
+    return {(term.id, term.factor) for term in terms if term.kind in ("swapped", *OF_INPUTS)}
 
 
 def distinct(ranked: Iterable[tuple[float, Linear]]) -> list[tuple[float, Linear]]:
@@ -96,7 +98,7 @@ class Sensitivities:
         """Return sensitivities to some entries at x (n,), where the residuals are e."""
         if all(entries[i].kind in CORRECTIONS for i in wanted):  # no simulation is needed
             return self._problem.jacobian(terms, entries, x, wanted)
-        inputs = [(term.id, term.factor) for term in terms if term.kind in ("input", "exchanged")]
+        inputs = [(term.id, term.factor) for term in terms if term.kind in OF_INPUTS]
         what = (*inputs, *((entries[i].identity, x[i]) for i in wanted))
         known = self._known.setdefault(what, [])
         for there, columns in known:
@@ -232,15 +234,16 @@ class Ranking:
                     yield linear
                 levels.setdefault(key(linear.terms), linear.levels)
 
-    def with_gross_errors(self, nominal: Linear) -> Linear:
+    def with_gross_errors(self, nominal: Linear, without: Collection[str] = ()) -> Linear:
         """Return the nominal model with the units and regressions that gain most in the linear problem, one after the
-        other, as long as each is a gross error.
+        other, as long as each is a gross error; `without` errors of some kinds.
         """
+        terms = [term for term in self.gross if term.kind not in without]
         here, before = nominal, self.score(nominal)
         while len(here.terms) < MOST_TERMS:
             added = [
                 (score, there)
-                for score, there in self.additions(here, self.gross)
+                for score, there in self.additions(here, terms)
                 for new in [new_term(here, there)]
                 if is_gross_kind(new) and new.kind != "offset"  # a step is judged with the noise of a fit
             ]

@@ -39,6 +39,7 @@ from subzero.identification.nearness import follows
 from subzero.identification.problem import Problem, Progress
 from subzero.identification.ranking import (
     GROSS,
+    OF_INPUTS,
     Key,
     Ranking,
     distinct,
@@ -201,14 +202,20 @@ class Search:
         self._fit(nominal)
 
     def _fit_first(self, nominal: Linear) -> None:
-        """Fit the gross errors in the data that gain most at the nominal model; where they do not explain the records,
-        the one term that leads closest to these, and if need be what gross errors there are with it.
+        """Fit the gross errors in the data that gain most at the nominal model: also those of channels alone, if one of
+        an input is among them, which several channels may show, each of which may be wrong as well. Where they do not
+        explain the records, the one term that leads closest to these, and if need be what gross errors there are with
+        it.
         """
-        if follows(self.problem, self._fit(self.ranking.with_gross_errors(nominal))):
+        first = self.ranking.with_gross_errors(nominal)
+        found = [self._fit(first)]
+        if any(term.kind in OF_INPUTS for term in first.terms):
+            found.append(self._fit(self.ranking.with_gross_errors(nominal, without=OF_INPUTS)))
+        if any(follows(self.problem, each) for each in found):
             return
-        first = self.ranking.nearest(nominal)
-        if first and not follows(self.problem, self._fit(first)):
-            self._fit(self.ranking.with_gross_errors(first))
+        closest = self.ranking.nearest(nominal)
+        if closest and not follows(self.problem, self._fit(closest)):
+            self._fit(self.ranking.with_gross_errors(closest))
 
     def _run(self, with_outliers: bool) -> None:
         """Search; where the time or the number of fits does not suffice, an unknown input is tried all the same."""

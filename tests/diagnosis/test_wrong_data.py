@@ -2,8 +2,8 @@
 
 Verifies: the step of a rounded sensor is read off all that it has shown; records of the benchmark whose error a fin,
 another channel or another clock came close to. Configuration: short zigzags of a healthy vehicle by the other
-formulation of the cable; seeds 7401 and 71125 of `benchmarks.diagnosis.data_errors`. Tolerance: numbers as in that
-benchmark (`is_right`).
+formulation of the cable; seeds 7401 and 71125 of `benchmarks.diagnosis.data_errors`, 8301 and 8302 of
+`benchmarks.diagnosis.unit_errors`. Tolerance: numbers as in those benchmarks.
 """
 
 import dataclasses
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import subzero
-from benchmarks.diagnosis import data_errors, world
+from benchmarks.diagnosis import data_errors, unit_errors, world
 from subzero import Logged
 from subzero.diagnosis import Setting, catalogue
 from subzero.diagnosis.hypothesis.data_error import DataError
@@ -109,3 +109,14 @@ def test_depth_in_decimetres_is_named_with_its_remedy_and_so_is_a_compass_that_i
     assert (depth.id, heading.id) == ("affine:depth", "reference:heading=is 90 degrees too large")
     assert depth.remedy == "divide it by 10"
     assert heading.remedy == "subtract 90 degrees"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed, index", [(8301, 0), (8302, 0), (8302, 3)])
+def test_several_columns_in_wrong_units_are_all_named(seed, index):
+    """Pitch in hundredths or tenths, which numbers can bend to; heading and yaw rate so small that the rudder seems to
+    be commanded in minutes of arc.
+    """
+    _, _, all_named, is_wrong = unit_errors.planted(seed, index)
+    assert all_named
+    assert not is_wrong
