@@ -30,7 +30,8 @@ from subzero.identification.explanation import (
 )
 from subzero.identification.fit import Linear, Products, quieter, spreads
 from subzero.identification.noise import BINDING, Filter, level_of
-from subzero.identification.problem import Problem, Readings
+from subzero.identification.problem import Problem
+from subzero.identification.readings import Readings
 from subzero.identification.repeats import repeats
 
 SAME_CLOCK = 0.1

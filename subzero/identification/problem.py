@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
 
@@ -22,15 +22,8 @@ from subzero.identification.explanation import (
     entries_of,
 )
 from subzero.identification.model import Model, Unknown
-from subzero.identification.noise import (
-    MEDIAN_TO_SD,
-    OPEN_SPREAD,
-    NoisePrior,
-    level_of,
-    middle_of_equal,
-    resolution_of,
-)
-from subzero.identification.outliers import are_turns, by_record, jumps, outliers_of, spikes, spikes_at_ends
+from subzero.identification.noise import MEDIAN_TO_SD, NoisePrior
+from subzero.identification.readings import SPIKE, Readings, are_turns, jumps, outliers_of
 from subzero.identification.record import Record
 from subzero.identification.simulation import Asked, Runs
 
@@ -41,8 +34,6 @@ DELAY_INTERVALS, DELAY_SHARE = 5.0, 0.03
 """Usual size of a delay, in sampling intervals, or over the duration of a record if that is more. [-]"""
 FEWEST_SAMPLES = 8
 """A channel with fewer readings in all records is not used."""
-SPIKE = 5.0
-"""A reading so many levels off the middle of those next to it, which agree with one another, is set aside. [-]"""
 RARE = 0.05
 """Largest share of a channel's readings that are set aside as outliers: more of them say something. [-]"""
 FREE_TURNS = 2.0
@@ -58,27 +49,6 @@ CORRECTIONS = ("offset", "step", "gain", "drift", "delay", "rate")
 
 Progress = Callable[[float, str], None]
 """(share that is done, present step)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Readings:
-    """Readings of a channel in all records, one after the other.
-
-    Attributes:
-        time: of each (m,). [s]
-        values: as recorded (m,).
-        record: which each belongs to (m,).
-        spikes: which are alone far from their neighbours, or outside the record's time (m,).
-        used: which are finite, no spikes, and the middle of equal ones in a row (m,).
-        prior: of the sensor.
-    """
-
-    time: np.ndarray
-    values: np.ndarray
-    record: np.ndarray
-    spikes: np.ndarray
-    used: np.ndarray
-    prior: NoisePrior
 
 
 class Problem:
@@ -150,26 +120,10 @@ class Problem:
                 for _, record in having
             ]
         )
-        finite = np.isfinite(values) & inside
-        if finite.sum() < FEWEST_SAMPLES:
+        if (np.isfinite(values) & inside).sum() < FEWEST_SAMPLES:
             return None
-        step = sensor.resolution if sensor.resolution is not None else resolution_of(values)
-        level = sensor.noise if sensor.noise is not None else level_of(values, step)
-        steps = np.diff(time)
-        spread = OPEN_SPREAD if sensor.noise is None else sensor.spread
-        prior = NoisePrior(level, step, float(np.median(steps[steps > 0.0])), spread)
         away = self._wrapped(name, values - self._at_nominal(name, having))
-        # In a wrong unit readings are rougher than the sensor says. What is read off them has their rounding in it.
-        least = float(np.hypot(level, step / np.sqrt(12.0)))
-        far, far_away = (SPIKE * max(least, level_of(rows, step)) for rows in (values, away))
-        alone = by_record(of, lambda at: spikes(values[at], far, sensor.turn))
-        alone |= by_record(of, lambda at: spikes_at_ends(away[at], min(far, far_away)))
-        aside = np.isfinite(values) & (~inside | alone)
-        used = finite & ~aside
-        for k, _ in having:
-            at = np.flatnonzero(used & (of == k))
-            used[at] = middle_of_equal(values[at])
-        return Readings(time, values, of, aside, used, prior)
+        return Readings.of(sensor, time, values, of, inside, away)
 
     def _at_nominal(self, name: str, having: Sequence[tuple[int, Record]]) -> np.ndarray:
         """Return what the nominal model shows of a channel at its times in some records (m,); NaN where it fails."""

@@ -33,8 +33,8 @@ from subzero.identification.noise import (
     middle_of_equal,
     resolution_of,
 )
-from subzero.identification.outliers import spikes, spikes_at_ends
 from subzero.identification.problem import Problem
+from subzero.identification.readings import spikes, spikes_at_ends
 from tests.identification.oscillator import STEP, model, record
 
 

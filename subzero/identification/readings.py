@@ -1,16 +1,80 @@
-"""Readings that stand alone: outliers of a channel, and the jumps of an angle that its logger wraps."""
+"""Readings of a channel, and those that stand alone: outliers, and the jumps of an angle that its logger wraps."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
+from subzero.identification.model import Sensor
+from subzero.identification.noise import OPEN_SPREAD, NoisePrior, level_of, middle_of_equal, resolution_of
+
+SPIKE = 5.0
+"""A reading so many levels off the middle of those next to it, which agree with one another, is set aside. [-]"""
 SAME_JUMP, ALONE = 0.25, 4.0
 """Steps of an angle within this share of a turn are turns of its logger; one stands alone if its neighbours are so
 many times smaller. [-]"""
 BY_ONE_SIDE = 2.0
 """A reading that has neighbours on one side alone is an outlier if it is so many times as far from them. [-]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Readings of a channel in all records, one after the other.
+
+    Attributes:
+        time: of each (m,). [s]
+        values: as recorded (m,).
+        record: which each belongs to (m,).
+        spikes: which are alone far from their neighbours, or outside the record's time (m,).
+        used: which are finite, no spikes, and the middle of equal ones in a row (m,).
+        prior: of the sensor.
+    """
+
+    time: np.ndarray
+    values: np.ndarray
+    record: np.ndarray
+    spikes: np.ndarray
+    used: np.ndarray
+    prior: NoisePrior
+
+    @classmethod
+    def of(
+        cls,
+        sensor: Sensor,
+        time: np.ndarray,
+        values: np.ndarray,
+        record: np.ndarray,
+        inside: np.ndarray,
+        away: np.ndarray,
+    ) -> Readings:
+        """Return readings with their spikes and the noise of their sensor.
+
+        Args:
+            sensor: what is declared of it.
+            time: of each (m,). [s]
+            values: as recorded (m,), NaN in gaps.
+            record: which each belongs to (m,).
+            inside: which are within the time of their record (m,).
+            away: their differences from the nominal model (m,).
+        """
+        step = sensor.resolution if sensor.resolution is not None else resolution_of(values)
+        level = sensor.noise if sensor.noise is not None else level_of(values, step)
+        steps = np.diff(time)
+        spread = OPEN_SPREAD if sensor.noise is None else sensor.spread
+        prior = NoisePrior(level, step, float(np.median(steps[steps > 0.0])), spread)
+        # In a wrong unit readings are rougher than the sensor says. What is read off them has their rounding in it.
+        least = float(np.hypot(level, step / np.sqrt(12.0)))
+        far, far_away = (SPIKE * max(least, level_of(rows, step)) for rows in (values, away))
+        alone = by_record(record, lambda at: spikes(values[at], far, sensor.turn))
+        alone |= by_record(record, lambda at: spikes_at_ends(away[at], min(far, far_away)))
+        aside = np.isfinite(values) & (~inside | alone)
+        used = np.isfinite(values) & inside & ~aside
+        for k in np.unique(record).tolist():
+            at = np.flatnonzero(used & (record == k))
+            used[at] = middle_of_equal(values[at])
+        return cls(time, values, record, aside, used, prior)
 
 
 def by_record(record: np.ndarray, found_in: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
