@@ -22,7 +22,7 @@ from subzero.identification.fit import Fit, Linear, free_fit, spreads
 from subzero.identification.locks import locks
 from subzero.identification.model import Model
 from subzero.identification.named_terms import NAMED_PROBABILITY, histories, named_term, said_of
-from subzero.identification.nearness import Nearness, nearness, rms
+from subzero.identification.nearness import Nearness, levels_left, nearness
 from subzero.identification.problem import Problem, Progress
 from subzero.identification.record import Record
 from subzero.identification.search import Search
@@ -143,9 +143,8 @@ def _concluded(search: Search, held_out: Sequence[Record], outliers: Mapping[str
     problem, ranked = search.problem, search.ranked()
     best, probabilities = ranked[0], _probabilities(search, ranked)
     free = free_fit(problem, best.terms, best.values, best.linear.levels.sizes)
-    near, budget = nearness(problem, best, free), _budget(search, best, free)
-    taken = {share.term: (share.before, share.after) for share in budget}
-    own = locks(problem, best, free, taken, held_out, settled=search.settled) if near.near else {}
+    near = nearness(problem, best, free)
+    own = locks(problem, best, free, held_out, settled=search.settled) if near.near else {}
     terms = [
         named_term(problem, best, said, own.get(said.term.id), near)
         for said in said_of(ranked, probabilities)
@@ -162,7 +161,7 @@ def _concluded(search: Search, held_out: Sequence[Record], outliers: Mapping[str
         suspected=suspected,
         explanations=_shown(ranked, probabilities),
         relations=tuple(_relations(problem, ranked, probabilities / probabilities.sum())),
-        budget=budget,
+        budget=_budget(search, best, free),
         remainder=_remainder(problem, best, near),
         visible_from=_visible_from(search),
         notes=_notes(problem, search, outliers),
@@ -270,21 +269,15 @@ def _budget(search: Search, best: Fit, free: Fit) -> tuple[Share, ...]:
     problem, levels = search.problem, search.problem.levels(best.terms)
     bare = {term: search.ranking.there(free.linear, without(best.terms, term)) for term in best.terms}
     lacking = {
-        term: _levels_left(problem, linear, levels) if linear else math.inf for term, linear in bare.items()
+        term: levels_left(problem, linear, levels) if linear else math.inf for term, linear in bare.items()
     }
     terms = sorted(best.terms, key=lambda term: -lacking[term])
     sizes = best.linear.levels.sizes
     fits = [free_fit(problem, tuple(terms[:count]), best.values, sizes) for count in range(len(terms))]
-    left = [_levels_left(problem, fitted.linear, levels) for fitted in (*fits, free)]
+    left = [levels_left(problem, fitted.linear, levels) for fitted in (*fits, free)]
     return tuple(
         Share(term.id, before, after) for term, before, after in zip(terms, left[:-1], left[1:], strict=True)
     )
-
-
-def _levels_left(problem: Problem, linear: Linear, levels: Mapping[str, float]) -> float:
-    """Return the remainder of all channels together, root mean square, in levels of their sensors."""
-    e = linear.e
-    return rms(np.concatenate([e[name][problem.used(name, linear.terms)] / levels[name] for name in e]))
 
 
 def _remainder(problem: Problem, best: Fit, near: Nearness) -> str:

@@ -18,7 +18,7 @@ The interval of the gain is a bootstrap over blocks of time (Künsch 1989), as r
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -28,7 +28,7 @@ from scipy.special import ndtri
 from subzero.identification.explanation import CLOCK, Entry, Term, Terms, data_terms, without
 from subzero.identification.fit import Fit, Products, free_fit, spreads
 from subzero.identification.model import COMMAND
-from subzero.identification.nearness import beyond, rests_on_histories, witnesses
+from subzero.identification.nearness import beyond, levels_left, rests_on_histories, witnesses
 from subzero.identification.problem import FEWEST_SAMPLES, Problem
 from subzero.identification.record import Record
 
@@ -45,10 +45,6 @@ explains a channel); so are equal readings. Another sign or a turn is not: a mod
 """
 BLOCKS, DRAWS, SURE = 20, 2000, 0.05
 """Blocks of a record, draws of the bootstrap, and the share of them outside an interval, to either side."""
-
-
-Taken = Mapping[str, tuple[float, float]]
-"""Term → what a free simulation leaves without and with it, after those before it. [levels of the sensors]"""
 
 
 @dataclass(frozen=True)
@@ -89,13 +85,7 @@ class Locks:
 
 
 def locks(
-    problem: Problem,
-    best: Fit,
-    free: Fit,
-    taken: Taken,
-    held_out: Sequence[Record],
-    *,
-    settled: bool,
+    problem: Problem, best: Fit, free: Fit, held_out: Sequence[Record], *, settled: bool
 ) -> dict[str, Locks]:
     """Return the locks of every term of the best explanation: id → locks.
 
@@ -103,7 +93,6 @@ def locks(
         problem: records and model.
         best: the fit of the explanation.
         free: that of the same in free simulation.
-        taken: what each term takes there.
         held_out: records that no fit has seen.
         settled: whether all next to the explanation was tried.
     """
@@ -118,29 +107,40 @@ def locks(
     if others:
         gains |= _gains(problem, best, others, _folds(problem, held_out, split, gap))
     rests = _share_unknown(problem, terms) > MOST and rests_on_histories(problem, best)
-    doubted, minor = _doubted(problem, best, rests=rests), _minor(taken, beyond(problem, free))
-    found = {}
-    for term in terms:
-        gain = gains.get(term.id)
-        reasons = [*_late_commands(problem, term), *doubted.get(term.id, ())]
-        if not (_is_plain(term) or (gain and gain.strict)):
-            reasons += minor.get(term.id, ())
-        found[term.id] = _locks(term, gain, reasons, settled)
-    return found
-
-
-def _minor(taken: Taken, remains: float) -> dict[str, list[str]]:
-    """Return term → that it takes less in free simulation than remains beyond what a near model leaves (mean square, in
-    squared levels).
-    """
+    doubted = _doubted(problem, best, rests=rests)
+    surely = [term for term in terms if (gain := gains.get(term.id)) and gain.strict]
+    minor = _minor(
+        problem, best, free, [term for term in terms if term not in surely and not _is_plain(term)]
+    )
     return {
-        term: [
-            f"it takes {before - after:.2f} of {before:.2f} levels of the sensors, and more remains than a near model "
-            "leaves"
-        ]
-        for term, (before, after) in taken.items()
-        if before**2 - after**2 < remains
+        term.id: _locks(
+            term,
+            gains.get(term.id),
+            [*_late_commands(problem, term), *doubted.get(term.id, ()), *minor.get(term.id, ())],
+            settled,
+        )
+        for term in terms
     }
+
+
+def _minor(problem: Problem, best: Fit, free: Fit, terms: Sequence[Term]) -> dict[str, list[str]]:
+    """Return term → that it takes less in free simulation, all other numbers fitted again without it, than remains
+    beyond what a near model leaves.
+    """
+    found: dict[str, list[str]] = {}
+    if not (remains := beyond(problem, free)):
+        return found
+    levels, sizes = problem.levels(best.terms), best.linear.levels.sizes
+    after = levels_left(problem, free.linear, levels)
+    for term in terms:
+        lacking = free_fit(problem, without(best.terms, term), best.values, sizes)
+        before = levels_left(problem, lacking.linear, levels)
+        if before**2 - after**2 < remains:
+            found[term.id] = [
+                f"free simulation leaves {before:.2f} levels of the sensors without it and {after:.2f} with it: less than "
+                "remains beyond a near model"
+            ]
+    return found
 
 
 def _locks(term: Term, gain: Gain | None, reasons: Sequence[str], settled: bool) -> Locks:

@@ -12,13 +12,13 @@ explanations with each other, not with the truth (Kennedy & O'Hagan 2001; Brynja
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from subzero.identification.explanation import CLOCK, kinds_of
-from subzero.identification.fit import Fit
+from subzero.identification.fit import Fit, Linear
 from subzero.identification.problem import Problem
 
 NEAR_LEFT = 1.4
@@ -229,6 +229,12 @@ def beyond(problem: Problem, free: Fit) -> float:
             squares.append(max(over, 0.0) / level**2)
             counts.append(int(used.sum()))
     return float(np.average(squares, weights=counts))
+
+
+def levels_left(problem: Problem, linear: Linear, levels: Mapping[str, float]) -> float:
+    """Return the remainder of all channels together, root mean square, in levels of their sensors."""
+    e = linear.e
+    return rms(np.concatenate([e[name][problem.used(name, linear.terms)] / levels[name] for name in e]))
 
 
 def left_by(problem: Problem, fitted: Fit, free: Fit) -> list[Left]:
