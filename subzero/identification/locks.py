@@ -137,8 +137,8 @@ def _minor(problem: Problem, best: Fit, free: Fit, terms: Sequence[Term]) -> dic
         before = levels_left(problem, lacking.linear, levels)
         if before**2 - after**2 < remains:
             found[term.id] = [
-                f"free simulation leaves {before:.2f} levels of the sensors without it and {after:.2f} with it: less than "
-                "remains beyond a near model"
+                f"free simulation leaves {before:.2f} levels of the sensors without it and {after:.2f} with it: "
+                "less than remains beyond a near model"
             ]
     return found
 
