@@ -97,6 +97,7 @@ def test_every_number_comes_back_within_its_interval(found, hidden):
         assert one.is_determined
 
 
+@pytest.mark.long
 def test_what_no_record_shows_is_not_determined_and_stays_as_wide_as_it_was(found):
     one = found[UNSEEN]
     assert not one.is_determined
@@ -105,6 +106,7 @@ def test_what_no_record_shows_is_not_determined_and_stays_as_wide_as_it_was(foun
     assert UNSEEN in found.directions[0].sentence
 
 
+@pytest.mark.long
 def test_intervals_are_where_the_posterior_has_fallen_by_as_much_as_they_say(found):
     for name in FREE:
         one, profile = found[name], found.profiles[f"vehicle.{name}"]
@@ -113,6 +115,7 @@ def test_intervals_are_where_the_posterior_has_fallen_by_as_much_as_they_say(fou
         assert profile.high - profile.low == pytest.approx(width, rel=0.25), name
 
 
+@pytest.mark.long
 def test_a_record_that_was_not_fitted_is_predicted_to_its_noise(found):
     assert found.how == "other trials"
     assert found.error("before") > 2.0
@@ -120,12 +123,14 @@ def test_a_record_that_was_not_fitted_is_predicted_to_its_noise(found):
     assert found.error("fitted") == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.long
 def test_correlations_are_those_of_a_covariance(found):
     C = found.correlation
     assert np.allclose(np.diag(C), 1.0)
     assert np.all(np.linalg.eigvalsh(C) > 0.0)
 
 
+@pytest.mark.long
 def test_advice_sharpens_and_never_blunts(found):
     assert found.advice
     assert all(factor > 0.999 for one in found.advice for factor in one.sharper.values())
@@ -134,6 +139,7 @@ def test_advice_sharpens_and_never_blunts(found):
     )
 
 
+@pytest.mark.long
 def test_the_file_is_a_vehicle_that_a_trial_takes(found, written, records):
     text = trial_text(COMMANDS["turn"]).replace('vehicle = "subzero2"', 'vehicle = "my_vehicle.toml"')
     (written.parent / "mine.toml").write_text(text, encoding="utf-8")
@@ -145,6 +151,7 @@ def test_the_file_is_a_vehicle_that_a_trial_takes(found, written, records):
     assert trial.vehicle["rigid_body"] == untouched["rigid_body"]
 
 
+@pytest.mark.long
 def test_the_file_says_where_it_comes_from(found, written, records):
     table = tomllib.loads(written.read_text(encoding="utf-8"))
     leaf = table["axial_drag"]["drag_coefficient"]
@@ -164,6 +171,7 @@ def test_calibrated_again_a_vehicle_stays_as_it_is(found, written, records):
         assert again[name].before == pytest.approx(found[name].value, rel=1e-5)
 
 
+@pytest.mark.long
 def test_the_json_file_has_it_all_and_no_nan(found):
     from subzero.cli.write_calibration import text
 
@@ -197,11 +205,13 @@ def test_a_prescribed_motion_is_refused(records):
         subzero.calibrate(replace(one, setting=still))
 
 
+@pytest.mark.long
 def test_a_calibration_that_holds_is_not_refused(found):
     assert found.verdict == "calibrated"
     assert not found.refused
 
 
+@pytest.mark.long
 def test_where_nothing_comes_near_there_is_no_vehicle(refused):
     assert refused.verdict == "nothing_near"
     with pytest.raises(subzero.UserError, match="There is no calibrated vehicle: The heading") as caught:
@@ -229,6 +239,7 @@ def refused(found):
     return replace(found, refused=("The heading is missed.",), files={}, profiles={}, advice=())
 
 
+@pytest.mark.long
 def test_the_command_writes_no_vehicle_where_nothing_comes_near(command, refused):
     code, said, folder, _ = command("--out", "flown/mine.toml", answer=refused)
     assert code == 3
@@ -257,6 +268,7 @@ def command(found, records, tmp_path, monkeypatch, capsys):
     return run
 
 
+@pytest.mark.long
 def test_the_command_writes_vehicle_numbers_and_figures_and_tells(command, found):
     code, said, folder, asked = command("--free", FREE[0], FREE[1], "--out", "flown/mine.toml")
     assert code == 0
@@ -279,6 +291,7 @@ def test_the_command_refuses_before_it_reads(command, words, message):
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.long
 def test_the_command_speaks_json(command, found):
     code, said, _, _ = command("--json")
     assert code == 0

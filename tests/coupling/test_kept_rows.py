@@ -50,6 +50,7 @@ def test_without_a_cable_too():
     )
 
 
+@pytest.mark.long
 def test_a_run_that_stops_keeps_the_last_that_it_had():
     fig6 = subzero.load_scenario("fig6")
     stiff = dict(fig6.cable) | {"bending_stiffness": 1.0, "mass_per_length": 0.2}

@@ -58,15 +58,18 @@ def error(segment_length):
     return np.abs(shape[:, 2] - exact).max() / exact.max()
 
 
+@pytest.mark.long
 def test_a_hinged_beam_under_tension_hangs_as_its_closed_form():
     assert error(0.25) < 2e-4
 
 
+@pytest.mark.long
 def test_its_error_falls_with_the_square_of_the_segment():
     sizes = (1.0, 0.5, 0.25)
     assert np.polyfit(np.log(sizes), np.log([error(size) for size in sizes]), 1)[0] > 1.8
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("factor", [0.1, 5.0])
 def test_softer_and_stiffer_beams_have_theirs(factor):
     shape, weight = hanging_shape(0.25, factor)
@@ -75,6 +78,7 @@ def test_softer_and_stiffer_beams_have_theirs(factor):
     assert abs(exact.max() / sag(LENGTH / 2.0, weight, STIFFNESS) - 1.0) > 0.05, "and it is another one"
 
 
+@pytest.mark.long
 def test_without_stiffness_it_is_a_parabola():
     shape, weight = hanging_shape(0.25, 0.0)
     parabola = weight / TENSION * shape[:, 0] * (LENGTH - shape[:, 0]) / 2.0
@@ -87,6 +91,7 @@ def bowing(t):
     return speed * np.cos(angle), 0.6 * speed * np.sin(angle), 0.8 * speed * np.sin(angle)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("segment_length", [0.25, 0.03])
 def test_a_stiff_cable_of_short_segments_does_not_spike(segment_length):
     """EI/Δs² is a hundred times the tension and more: an explicit moment would ring. Nothing else is new in the pull.

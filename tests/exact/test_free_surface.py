@@ -171,6 +171,7 @@ def drawn(east):
     return cable.pull_out(way, 6.0, drum=cable.Brake(), start=start, scheme=cable.MovingEnd(time_step=0.01))
 
 
+@pytest.mark.long
 def test_a_rope_that_is_pulled_off_a_drum_at_the_surface_stays_in_the_water():
     run = cable.pull_out(lambda t: (1.0, 0.0, 0.0), 4.0, cable=rope(0.6), surface=0.0)
     assert run.has_surface

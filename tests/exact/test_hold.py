@@ -206,6 +206,7 @@ def test_bending_stiffness_flattens_the_bottom_of_a_loop():
     assert_allclose(stiff.tow_force[2], limp.tow_force[2], rtol=1e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ends", [((0.0, 0.0, 0.3), STILL), (STILL, STILL)])
 def test_a_stiff_cable_that_would_be_folded_is_refused(ends):
     with pytest.raises(UserError, match=r"only found folded, by 1\d\d degrees|No equilibrium was found"):

@@ -54,6 +54,7 @@ def at_rest(line):
     )
 
 
+@pytest.mark.long
 def test_a_chain_on_a_floor_pulls_as_moorpy_says():
     line = at_rest(cable.read_deck(DECK).lines[0])
     assert np.linalg.norm(line.tow_force) == pytest.approx(22.924, rel=1e-3)

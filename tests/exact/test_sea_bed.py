@@ -56,6 +56,7 @@ def held(cord, bed, segments=200, east=0.0):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction", [0.0, 0.4, 2.0])
 @pytest.mark.parametrize("compliance", [0.0, 2e-4])
 def test_a_cable_on_a_bed_pulls_as_the_closed_form_says(compliance, friction):
@@ -72,6 +73,7 @@ def test_a_cable_on_a_bed_pulls_as_the_closed_form_says(compliance, friction):
     assert_allclose(line.drum_force[0], at_anchor, atol=half + 1e-4 * weight * LENGTH)
 
 
+@pytest.mark.long
 def test_forces_are_of_second_order_in_the_segments():
     """The point where the cable touches lies between nodes: the worst of several spans shows the order."""
     cord, counts, errors = chain(), (25, 50, 100, 200), []
@@ -88,6 +90,7 @@ def test_forces_are_of_second_order_in_the_segments():
     assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] > 1.8, errors
 
 
+@pytest.mark.long
 def test_on_a_slope_tension_grows_uphill_by_the_weight_along_it():
     cord, slope, L = chain(compliance=1e-4), 0.2, 30.0
     bed = SeaBed(depth=10.0, slope_north=slope, axial_friction=0.0, modulus=HARD)
@@ -100,6 +103,7 @@ def test_on_a_slope_tension_grows_uphill_by_the_weight_along_it():
     assert bed.below(line.shape).max() == pytest.approx(bed.sinkage(cord), rel=0.03)  # cos 11.3° is 0.98
 
 
+@pytest.mark.long
 def test_a_cable_that_lies_keeps_its_forces():
     """Friction holds without creeping: in 20 s the pull at the anchor changes by what Newton's method leaves."""
     line = held(chain(compliance=1e-5), SeaBed(depth=0.0), segments=50)
@@ -109,6 +113,7 @@ def test_a_cable_that_lies_keeps_its_forces():
     assert_allclose(run.drum_tension[-1], line.tensions[-1], rtol=1e-4)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_a_cable_drawn_along_the_bed_pulls_with_friction_times_weight(friction):
     """The tow point is held at the surface of the bed, and takes 0.2 % of the weight off it."""
@@ -119,6 +124,7 @@ def test_a_cable_drawn_along_the_bed_pulls_with_friction_times_weight(friction):
     assert -run.tow_force[-1, 0] == pytest.approx(friction * cord.weight_in_water * lies + drag, rel=3e-3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction", [0.2, 0.6])
 def test_a_cable_drawn_across_the_bed_pulls_with_friction_times_weight(friction):
     """Both ends go sideways until all of the cable follows; no drag but the bed's, on what the ends do not carry."""
@@ -163,11 +169,13 @@ def moved():
     return run_of(1.0)
 
 
+@pytest.mark.long
 def test_a_mirrored_run_gives_mirrored_forces(moved):
     mirrored = run_of(-1.0).tow_force * (1.0, -1.0, 1.0)
     assert_allclose(mirrored, moved.tow_force, atol=1e-6 * np.abs(moved.tow_force).max())
 
 
+@pytest.mark.long
 def test_what_the_bed_takes_is_booked_and_no_node_sinks_in_by_a_diameter(moved):
     assert moved.outcome.completed
     assert moved.outcome.energy_residual < 0.01
@@ -176,6 +184,7 @@ def test_what_the_bed_takes_is_booked_and_no_node_sinks_in_by_a_diameter(moved):
     assert max(bed.below(shape - anchor).max() for shape in moved.shapes) < chain().diameter
 
 
+@pytest.mark.long
 def test_a_towed_cable_trails_on_the_bed():
     """Steadily towed over the bed, what lies pulls with μ times its weight, besides its drag."""
     cord, bed = chain(), SeaBed(depth=2.0, axial_friction=0.5, modulus=1e6)

@@ -164,6 +164,7 @@ def test_the_forces_of_a_rigid_body_do_no_work():
         assert force[2] == pytest.approx(MASS * (u * q - v * p + ZG * (p**2 + q**2)))  # not its negative
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", RUNS)
 def test_the_file_moves_as_the_published_equations(name):
     n, dr, ds, bow, current = RUNS[name]

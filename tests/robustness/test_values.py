@@ -97,6 +97,7 @@ def test_a_run_ends_when_it_is_asked_to_though_that_is_no_whole_step(fig6, durat
     assert (np.diff(run["time"].values) > 0.0).all()
 
 
+@pytest.mark.long
 def test_a_prescribed_motion_and_the_printed_scheme_end_when_they_are_asked_to():
     for name in ("fig5", "spiral"):
         trial = dataclasses.replace(subzero.load_scenario(name), duration=0.95)

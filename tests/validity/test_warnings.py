@@ -477,6 +477,7 @@ def test_a_dive_below_the_sea_bed_says_when(tethered):
     assert not checked(run, dataclasses.replace(dive, sea_bed=0.0), check="below_sea_bed")
 
 
+@pytest.mark.long
 def test_a_heavy_cable_that_is_dragged_deep_into_the_sea_bed_says_so():
     """No more than a tenth of a metre deep: the bed holds it, though it is soft."""
     trial = trial_of(
