@@ -53,6 +53,7 @@ LIMITS = {
 }
 """The observed channels, in this order, with the limits of the observation space."""
 LOW, HIGH = np.array(list(LIMITS.values()), dtype=np.float32).T.copy()
+"""These limits as arrays (6,)."""
 TRUTH = ("wanted_heading", *Observation._fields)
 """The contents of an info: the reference heading [rad], and the true values."""
 HEADING = Observation._fields.index("heading")

@@ -151,10 +151,8 @@ class _Followed:
 
     def __init__(self, problem: Problem, linear: Linear, name: str) -> None:
         sd, self._used = spreads(linear.entries, linear.levels), problem.used(name, linear.terms)
-        self._level, self._spread = (
-            problem.levels(linear.terms)[name],
-            problem.prior(name, linear.terms).spread,
-        )
+        self._level = problem.levels(linear.terms)[name]
+        self._spread = problem.prior(name, linear.terms).spread
         F = linear.J[name][self._used] * sd / self._level
         self._squares, V = np.linalg.eigh(F.T @ F)
         self._F, self._at_centre = F @ V, F @ (linear.off / sd)

@@ -138,7 +138,7 @@ def _minor(problem: Problem, best: Fit, free: Fit, terms: Sequence[Term]) -> dic
         if before**2 - after**2 < remains:
             found[term.id] = [
                 f"free simulation leaves {before:.2f} levels of the sensors without it and {after:.2f} with it: "
-                "less than remains beyond a near model"
+                "it takes less than remains beyond what a near model leaves"
             ]
     return found
 
