@@ -195,10 +195,15 @@ def test_what_cannot_be_done_is_told(call, words):
 WITHOUT_A_PROPELLER = ("open_frame", "seawing")
 LONG = ("nps_auv2",)
 """Hulls of several metres, for which the manoeuvres are too short to have all indices."""
+SLOW = ("bluerov2_heavy",)
+VEHICLES = [
+    pytest.param(name, marks=pytest.mark.long) if name in SLOW else name
+    for name in [*shipped("vehicles"), "auv.toml"]
+]
 
 
 @pytest.mark.parametrize("name", list(MANOEUVRES))
-@pytest.mark.parametrize("vehicle", [*shipped("vehicles"), "auv.toml"])
+@pytest.mark.parametrize("vehicle", VEHICLES)
 def test_every_vehicle_flies_what_its_actuators_allow_and_says_why_not(tmp_path, name, vehicle):
     """REMUS 100 needs 1.58 m/s to be held level; a torpedo from four numbers flies at 1 m/s as Subzero does."""
     if vehicle == "auv.toml":
@@ -219,6 +224,7 @@ def test_every_vehicle_flies_what_its_actuators_allow_and_says_why_not(tmp_path,
         assert {"forces"} < subzero.figures.draw(run).keys()
 
 
+@pytest.mark.long
 def test_thrusters_turn_to_either_side_alike_and_those_that_do_not_pitch_say_so():
     """The overshoots of a zigzag by moments: a rudder to starboard turns the heading to starboard."""
     trial = with_vehicle(subzero.load_scenario("fig6"), "bluerov2_heavy")[0]

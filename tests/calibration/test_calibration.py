@@ -250,11 +250,11 @@ def test_the_command_writes_no_vehicle_where_nothing_comes_near(command, refused
 
 
 @pytest.fixture
-def command(found, records, tmp_path, monkeypatch, capsys):
+def command(records, tmp_path, monkeypatch, capsys):
     """The command line with a calibration that is done already: words → exit code, what it says, its folder."""
     asked = {}
 
-    def run(*words, answer=found):
+    def run(*words, answer=None):
         def done(logged, **options):
             asked.update(options, names=[one.name for one in logged])
             return answer
@@ -270,7 +270,7 @@ def command(found, records, tmp_path, monkeypatch, capsys):
 
 @pytest.mark.long
 def test_the_command_writes_vehicle_numbers_and_figures_and_tells(command, found):
-    code, said, folder, asked = command("--free", FREE[0], FREE[1], "--out", "flown/mine.toml")
+    code, said, folder, asked = command("--free", FREE[0], FREE[1], "--out", "flown/mine.toml", answer=found)
     assert code == 0
     assert asked["free"] == [f"vehicle.{name}" for name in FREE[:2]]
     assert (folder / "flown/mine.toml").read_text(encoding="utf-8") == found.vehicle
@@ -293,7 +293,7 @@ def test_the_command_refuses_before_it_reads(command, words, message):
 
 @pytest.mark.long
 def test_the_command_speaks_json(command, found):
-    code, said, _, _ = command("--json")
+    code, said, _, _ = command("--json", answer=found)
     assert code == 0
     assert json.loads(said)["numbers"][f"vehicle.{FREE[0]}"]["value"] == pytest.approx(found[FREE[0]].value)
 

@@ -237,6 +237,7 @@ def test_at_every_width_letters_are_legible_and_no_legend_hides_a_curve(width, c
                 assert not inside.any(), (axes.get_title(loc="left"), curve.get_label())
 
 
+@pytest.mark.long
 def test_a_narrow_figure_has_its_panels_below_one_another(comparison):
     with page_width(3.4):
         panels = draw(comparison)["fig6"].axes
@@ -264,7 +265,9 @@ def test_a_cable_that_would_be_a_flat_line_is_stretched_and_says_how_much(make_r
     assert "stretched" not in steep.get_title(loc="left")
 
 
-@pytest.mark.parametrize("kind", ["svg", pytest.param("pdf", marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "kind", [pytest.param("svg", marks=pytest.mark.long), pytest.param("pdf", marks=pytest.mark.slow)]
+)
 def test_figures_are_drawings_if_asked_for_and_two_are_alike_to_the_last_byte(kind, rails, tmp_path):
     from subzero.cli.app import FINE, main
 

@@ -239,6 +239,7 @@ def log(tmp_path, monkeypatch):
     assert main(["import", "log.csv"]) == FINE
 
 
+@pytest.mark.long
 def test_a_log_with_its_map_is_compared_as_its_record(log, capsys):
     for name, words in (("direct", ["log.csv", "--map", "record.map.toml"]), ("record", ["record.csv"])):
         assert main(["compare", "fig6", "--quiet", "--out", name, "--measured", *words]) == FINE

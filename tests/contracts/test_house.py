@@ -47,19 +47,23 @@ def stands():
     return figures()
 
 
+@pytest.mark.long
 def test_no_modules_import_one_another(stands):
     assert {row: one.circles for row, one in stands.items() if one.circles} == {}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("row", FLOORS)
 def test_no_chain_of_imports_is_longer_than_it_was(stands, row):
     assert stands[row].floors <= FLOORS[row], stands[row].chain
 
 
+@pytest.mark.long
 def test_no_package_is_scattered_over_more_files_than_is_asked_for(stands):
     assert set(scattered(stands)) <= set(SMALL_FILES)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "row", ["subzero.autopilot", "subzero.records", "subzero.sweeps", "subzero.synthetic"]
 )
@@ -67,6 +71,7 @@ def test_a_file_with_one_importer_is_a_whole_concept(stands, row):
     assert stands[row].short_lone == []
 
 
+@pytest.mark.long
 def test_few_tests_of_the_diagnosis_know_more_of_it_than_its_faces(stands):
     one = stands["subzero.diagnosis"]
     assert one.tests_below_faces <= 0.1 * one.tests

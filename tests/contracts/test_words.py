@@ -27,6 +27,7 @@ def test_pages_have_no_private_words():
     assert {name: found for name, text in words.pages().items() if (found := words.private_words(text))} == {}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", ALLOWED)
 def test_no_more_private_words_than_are_allowed(found, kind):
     assert found[kind] <= ALLOWED[kind]

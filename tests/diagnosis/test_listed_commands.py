@@ -16,6 +16,7 @@ from subzero.diagnosis import NOISE, diagnose
 CHANNELS = ("heading", "yaw_rate", "pitch", "roll_angle", "depth", "surge_speed")
 
 
+@pytest.mark.long
 def test_a_glider_that_is_as_its_model_says_gets_no_name(tmp_path):
     text = subzero.load_scenario("glider_sawtooth").text
     assert "duration_s = 900.0" in text

@@ -97,6 +97,7 @@ def test_a_healthy_record_is_accused_of_nothing(seed, index):
     assert not verdict.data_errors
 
 
+@pytest.mark.long
 def test_depth_in_decimetres_is_named_with_its_remedy_and_so_is_a_compass_that_is_turned():
     """No unit of the table is ten times a metre: the error is y = a + b x, with b = 10."""
     clean = measured("dive", 20263)

@@ -7,17 +7,15 @@ readings are named by their equality. Truth is exact: the motor is linear of the
 standard deviations for numbers.
 """
 
-from functools import partial
-
 import numpy as np
 import pytest
 
 import subzero.diagnosis as sd
 from subzero.errors import UserError
+from tests.marks import LONG
 
 STEP, NOISE = 0.1, {"speed": 0.2, "current": 0.05}
 RESISTANCE, TORQUE, FRICTION = 2.0, 0.5, 0.02
-LONG = partial(pytest.param, marks=pytest.mark.long)
 
 
 def motor(p, u, t):
@@ -89,7 +87,7 @@ def test_a_delay_that_shows_at_jumps_alone_is_named(late, seed):
     assert delay.value == pytest.approx(late, abs=3.0 * delay.sd)
 
 
-@pytest.mark.parametrize("factor", [LONG(0.001), 0.1, 30.0 / np.pi, LONG(1000.0)])
+@pytest.mark.parametrize("factor", [LONG(0.001), 0.1, LONG(30.0 / np.pi), LONG(1000.0)])
 @pytest.mark.parametrize("noise", [True, False])
 def test_a_wrong_unit_is_named_whether_the_noise_is_declared_or_not(noise, factor):
     verdict = sd.diagnose(record(speed=factor), model(noise))

@@ -15,6 +15,7 @@ import pytest
 from scipy.linalg import expm
 
 import subzero.diagnosis as sd
+from tests.marks import LONG
 
 STEP = 0.1
 NOISE = {"rod": 0.05, "middle": 0.03, "end": 0.02}
@@ -74,7 +75,7 @@ def swapped(given, a, b):
     return sd.Record(given.time, columns)
 
 
-@pytest.mark.parametrize("noise", [True, False])
+@pytest.mark.parametrize("noise", [True, LONG(False)])
 def test_two_columns_that_are_exchanged_are_named(noise):
     verdict = sd.diagnose(swapped(record(), "rod", "middle"), model(noise=noise))
     assert verdict.verdict == "data_error"
@@ -96,6 +97,7 @@ def test_exchanged_columns_of_which_one_is_in_another_unit():
     assert {each.id for each in verdict.named} == {"swapped:rod/end", "unit:rod"}
 
 
+@pytest.mark.long
 def test_a_clock_of_all_channels_that_runs_fast_against_the_inputs():
     verdict = sd.diagnose(record(3, late=tuple(NOISE), fast=0.02), model())
     assert [each.id for each in verdict.named] == ["rate:clock"]
@@ -104,14 +106,14 @@ def test_a_clock_of_all_channels_that_runs_fast_against_the_inputs():
     assert rate.sd < 0.001
 
 
-@pytest.mark.parametrize("seed", [4, 5])
+@pytest.mark.parametrize("seed", [4, LONG(5)])
 def test_columns_in_their_places_and_right_clocks_are_not_named(seed):
     verdict = sd.diagnose(record(seed, late=("middle",), own=True), model())
     assert verdict.verdict == "nothing_wrong"
 
 
-@pytest.mark.parametrize("name, factor", [("power", -1.0), ("second", 1000.0), ("power", 1.0 / 60.0)])
-@pytest.mark.parametrize("noise", [True, False])
+@pytest.mark.parametrize("name, factor", [LONG("power", -1.0), ("second", 1000.0), LONG("power", 1.0 / 60.0)])
+@pytest.mark.parametrize("noise", [True, LONG(False)])
 def test_an_input_with_the_other_sign_or_in_another_unit(name, factor, noise):
     given = record(6)
     columns = {**given.columns, name: factor * given.columns[name]}
@@ -135,6 +137,7 @@ def planes(p, u, t):
     return {name: np.array(values) for name, values in shown.items()}
 
 
+@pytest.mark.long
 def test_two_inputs_with_the_other_sign_of_which_one_alone_brings_nothing_nearer():
     rng = np.random.default_rng(8)
     port, starboard = (np.repeat(rng.choice([-1.0, 0.0, 1.5], 10), 20) for _ in range(2))
@@ -160,12 +163,14 @@ def test_inputs_in_each_others_columns_beside_a_cause():
     assert verdict.named[0].sentence == "the inputs power and second have each other's columns"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("held", [0.0, 2.0])
 def test_an_input_that_never_moves_may_hold_the_column_of_one_that_does(held):
     verdict = sd.diagnose(swapped(record(7, levels=(held,)), "power", "second"), model())
     assert [each.id for each in verdict.named] == ["exchanged:power/second"]
 
 
+@pytest.mark.long
 def test_in_an_input_that_is_trusted_no_error_is_considered():
     given = record(6)
     columns = {**given.columns, "power": -given.columns["power"]}

@@ -12,6 +12,7 @@ import pytest
 import subzero.diagnosis as sd
 from benchmarks.diagnosis import structure
 from tests.identification.oscillator import NOISE, model, record
+from tests.marks import LONG
 
 
 def estimate(verdict, name):
@@ -80,7 +81,7 @@ def test_a_unit_is_named_whatever_the_parameters_would_bend(factor, words):
     assert words in verdict.named[0].sentence
 
 
-@pytest.mark.parametrize("step", [0.02, 0.05])
+@pytest.mark.parametrize("step", [0.02, LONG(0.05)])
 def test_a_unit_of_coarse_readings_is_named(step):
     """Rounded to twice or five times the noise of the sensor, and written in hundredths."""
     seen = record(3)
@@ -93,7 +94,9 @@ def test_a_unit_of_coarse_readings_is_named(step):
     assert found.estimates[0].value == 100.0
 
 
-@pytest.mark.parametrize("factor, words", [(0.1, "ten times too small"), (0.01, "a hundred times too small")])
+@pytest.mark.parametrize(
+    "factor, words", [LONG(0.1, "ten times too small"), (0.01, "a hundred times too small")]
+)
 def test_a_unit_that_is_too_large_is_named_where_the_motion_is_little_more_than_noise(factor, words):
     """All readings are within the noise that the sensor is said to have, and two are outliers."""
     seen, noise = record(2), 0.2
@@ -121,6 +124,7 @@ def test_of_a_linear_model_the_sign_of_the_readings_or_of_the_input_is_not_decid
     assert set(likely) == {"unit:x", "input:force"}
 
 
+@pytest.mark.long
 def test_a_search_ends_where_a_unit_and_a_regression_are_nearly_as_probable():
     """The regression is left for the unit, which was expanded before: neither is looked at again."""
     seen, sensor = record(1, samples=60), sd.Sensor(noise=0.01, unit="m", zero=1e-4, scale=0.3)

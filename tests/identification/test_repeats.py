@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import subzero.diagnosis as sd
+from tests.marks import LONG
 
 STEP, NOISE = 0.1, 0.05
 
@@ -53,7 +54,7 @@ def with_lost(made, value):
     return sd.Record(made.time, {**made.columns, "x": x})
 
 
-@pytest.mark.parametrize("value", [None, 0.0, -999.0])
+@pytest.mark.parametrize("value", [None, LONG(0.0), LONG(-999.0)])
 @pytest.mark.parametrize("gain", [1.0, 1.6])
 def test_a_value_in_place_of_measurements_is_named_beside_a_cause(gain, value):
     verdict = sd.diagnose(with_lost(record(gain=gain), value), model())

@@ -12,9 +12,10 @@ import pytest
 
 import subzero.diagnosis as sd
 from tests.identification.oscillator import model, record
+from tests.marks import LONG
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, LONG(1)])
 def test_a_limit_that_does_nothing_near_its_nominal_value_is_found(seed):
     """An actuator whose rate is limited far below what is asked of it: near no limit, nothing changes at all."""
 
@@ -116,7 +117,7 @@ def test_a_step_is_found_that_other_numbers_bend_to_suit(at):
     assert f"from {at:.0f}" in found.sentence or f"from {at - 0.1:.1f}" in found.sentence
 
 
-@pytest.mark.parametrize("drag", [0.2, 0.3])
+@pytest.mark.parametrize("drag", [0.2, LONG(0.3)])
 def test_no_model_is_asked_for_a_number_beyond_its_bounds(drag):
     """A drag that vanishes from some time on: a model that refuses less than none is not asked for it."""
 

@@ -15,6 +15,7 @@ import pytest
 from scipy.linalg import expm
 
 import subzero.diagnosis as sd
+from tests.marks import LONG
 
 NOISE, STEP, SAMPLES = 0.01, 0.1, 300
 PUSHES = ("left", "right")
@@ -148,7 +149,7 @@ def test_an_input_that_does_not_act_changes_nothing_of_a_healthy_verdict():
 
 
 @pytest.mark.parametrize(
-    "numbers, cause", [({"k": 4.6}, "stiffness"), ({"c": 0.5}, "damping"), ({"gain": 1.2}, "drive")]
+    "numbers, cause", [LONG({"k": 4.6}, "stiffness"), ({"c": 0.5}, "damping"), LONG({"gain": 1.2}, "drive")]
 )
 def test_a_cause_is_named_as_the_cause(numbers, cause):
     verdict = sd.diagnose(record(0, **numbers), model())
@@ -165,7 +166,7 @@ def test_a_search_that_is_ended_before_all_was_tried_next_to_its_best_explanatio
     assert stiffness.against == ("the search was ended before all that is next to it was tried",)
 
 
-@pytest.mark.parametrize("factor, named", [(1.0 / 0.3048, ["unit:b"]), (-1.0, [])])
+@pytest.mark.parametrize("factor, named", [(1.0 / 0.3048, ["unit:b"]), LONG(-1.0, [])])
 def test_a_search_that_is_ended_names_a_known_unit_and_no_sign(monkeypatch, factor, named):
     """A model that is wrong may go the other way, but does not measure in feet."""
     monkeypatch.setattr("subzero.identification.search.MOST_FITS", 2)
@@ -192,8 +193,8 @@ def test_a_search_whose_time_is_over_before_that_names_no_cause(monkeypatch):
 @pytest.mark.parametrize(
     "error, wrong",
     [
-        ("offset:a", lambda a, b: {"a": a + 0.1}),
-        ("drift:a", lambda a, b: {"a": a + 0.1 * np.linspace(-0.5, 0.5, SAMPLES)}),
+        LONG("offset:a", lambda a, b: {"a": a + 0.1}),
+        LONG("drift:a", lambda a, b: {"a": a + 0.1 * np.linspace(-0.5, 0.5, SAMPLES)}),
         ("unit:b", lambda a, b: {"b": b / 0.3048}),
     ],
 )
@@ -203,7 +204,8 @@ def test_an_error_in_the_data_is_no_force(error, wrong):
     assert ids(verdict.named) == [error]
 
 
-@pytest.mark.parametrize("late", [5, pytest.param(33, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("late", [5, 33])
 def test_two_channels_that_are_late_together_have_one_late_clock(late):
     """By 0.5 s, which is usual, and by 3.3 s, a whole period of the carts."""
     given = record(5)
@@ -249,6 +251,7 @@ def test_a_force_is_named_where_another_record_is_held_out():
     assert ids(verdict.named) == ["unknown:left"]
 
 
+@pytest.mark.long
 def test_of_one_reading_and_two_like_forces_it_is_said_that_one_of_them_acts():
     def lag(p, u, t):
         return {"x": p["x0"] + (t[1] - t[0]) * np.cumsum(u["here"] + u["there"], axis=0)}
@@ -278,6 +281,7 @@ def test_of_one_reading_and_two_like_forces_it_is_said_that_one_of_them_acts():
     assert max(places) < 0.7
 
 
+@pytest.mark.long
 def test_a_usual_input_is_none_that_is_named():
     usual = [sd.Unknown(name, size=0.01, time=2.0) for name in PUSHES]
     verdict = sd.diagnose(record(0, left=hidden(0)), model(unknown=usual))

@@ -14,10 +14,13 @@ import pytest
 
 from subzero.page import browser as browser_of_page
 
-pytestmark = pytest.mark.skipif(
-    browser_of_page.installed() is None,
-    reason="needs Debian's chromium and chromium-driver, which are not here",
-)
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(
+        browser_of_page.installed() is None,
+        reason="needs Debian's chromium and chromium-driver, which are not here",
+    ),
+]
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +39,6 @@ def moved_to(browser: Any, time: float) -> dict[str, Any]:
     return browser.execute_script("return subzero.shown()")
 
 
-@pytest.mark.long
 def test_it_opens_without_an_error_and_nothing_acts(browser: Any) -> None:
     assert browser.get_log("browser") == []
     assert browser.execute_script("return window.acted === undefined")
@@ -77,7 +79,6 @@ def test_keys_and_the_button_play_and_step(browser: Any) -> None:
     assert browser.get_log("browser") == []
 
 
-@pytest.mark.long
 def test_without_webgl_there_are_flat_views(page: Path, runs: dict) -> None:
     with browser_of_page.opened(page, "--disable-3d-apis") as driver:
         assert driver.find_element("id", "no-webgl").is_displayed()

@@ -242,6 +242,7 @@ for kind in sys.argv[1:]:
 """
 
 
+@pytest.mark.long
 def test_code_that_two_processes_have_kept_for_two_kinds_of_records_is_not_confused(base, tmp_path):
     """A linker takes the first of two functions of one name; numba numbers kinds of records in each process anew."""
     path = tmp_path / "two_kinds.py"

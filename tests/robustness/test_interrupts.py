@@ -374,6 +374,7 @@ def test_an_interrupt_behind_the_linker_ends_the_call_and_nothing_else(nth):
     assert (done.returncode, done.stdout, done.stderr) == (0, "interrupted\n4.0\n", "")
 
 
+@pytest.mark.long
 def test_an_interrupt_behind_the_linker_ends_a_command_as_any_other(tmp_path):
     """A diagnosis died of SIGSEGV behind its last words."""
     record(tmp_path)

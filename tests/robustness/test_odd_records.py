@@ -15,6 +15,7 @@ from contextlib import contextmanager
 import pytest
 
 from subzero.cli.app import FINE, MISTAKE, main
+from tests.marks import LONG
 from tests.robustness import odd_records
 
 HANGS_S = 300.0
@@ -65,7 +66,9 @@ def reported(number, folder, capsys, *options):
     return found["verdict"]
 
 
-@pytest.mark.parametrize("number", [100, 102, 103, pytest.param(104, marks=pytest.mark.slow), 106, 131, 154])
+@pytest.mark.parametrize(
+    "number", [100, LONG(102), 103, pytest.param(104, marks=pytest.mark.slow), 106, LONG(131), LONG(154)]
+)
 def test_an_odd_record_gets_a_verdict_or_a_message(number, tmp_path, capsys):
     reported(number, tmp_path, capsys, "--screen")
 

@@ -403,6 +403,7 @@ def test_members_under_way_when_a_worker_dies_run_again_alone(tmp_path):
     assert len(deaths) >= MOST_DEATHS - 1
 
 
+@pytest.mark.long
 def test_a_worker_labels_nothing_and_so_starts_a_second_sooner():
     plan, pool = fast(2), WorkerPool(1)
     try:
