@@ -73,6 +73,7 @@ def test_the_same_seed_draws_the_same_heading(env):
     assert drawn[0] == drawn[1] != drawn[2]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("workers", [1, 2])
 def test_many_at_once_are_those_of_one_after_another_to_the_last_bit(monkeypatch, workers):
     """Episodes of five steps, so that environments begin again on the way."""
@@ -95,6 +96,7 @@ def test_many_at_once_are_those_of_one_after_another_to_the_last_bit(monkeypatch
             np.testing.assert_array_equal(ours, plain[-1][key])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("how, threads", [({}, 2), ({"sample_time": 1.0}, 2), ({"workers": 1}, 1)])
 def test_each_processor_has_a_thread_if_nothing_else_is_asked_for(monkeypatch, how, threads):
     """On a machine of two processors."""

@@ -278,6 +278,7 @@ def test_a_start_in_trim_has_its_speed_over_ground_whatever_the_water_does(simul
     assert_allclose(run["sway_speed"], across, atol=1e-6)
 
 
+@pytest.mark.long
 def test_the_papers_scheme_starts_in_the_same_steady_motion(simulate, trial_of):
     start = {"at_trim": True, "surge_speed": 1.0, "wet_length": 10.0}
     ours, printed = (

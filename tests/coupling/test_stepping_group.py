@@ -34,6 +34,7 @@ def seen(simulators):
     return np.array([each.observation for each in simulators])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("threads", [1, 2, 9])
 def test_threads_give_the_numbers_of_one_after_another(threads):
     alone, together = simulators(), simulators()

@@ -60,6 +60,7 @@ def test_a_chain_on_a_floor_pulls_as_moorpy_says():
     assert np.linalg.norm(line.tow_force) == pytest.approx(22.924, rel=1e-3)
 
 
+@pytest.mark.long
 def test_lines_at_a_free_point_are_one_of_sections_from_its_upper_end():
     line = cable.read_deck(DECK).lines[1]
     assert line.name == "2+3"

@@ -159,6 +159,7 @@ def test_internal_damping_has_its_jacobian_right_too(segments, stretch):
     assert_allclose(analytic / largest, numeric / largest, rtol=0, atol=2e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("segments", [2, 3, 4, 6])
 def test_bending_has_its_jacobian_right_too(segments):
     line, work = bent_line(segments, TURNING, 2, c=STIFF)
@@ -201,6 +202,7 @@ def test_clamped_ends_have_their_jacobian_right_too(segments):
     assert_allclose(analytic / largest, numeric / largest, rtol=0, atol=2e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", [TURNING, STANDING], ids=["turning", "standing"])
 def test_added_mass_along_has_its_jacobian_right_too(mode):
     c = CableProperties(
@@ -219,6 +221,7 @@ def test_added_mass_along_has_its_jacobian_right_too(mode):
     assert_allclose(analytic / largest, numeric / largest, rtol=0, atol=2e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction", [0.0, 0.2, 50.0], ids=["smooth", "slides", "sticks"])
 def test_a_sea_bed_has_its_jacobian_right_too(friction):
     """All nodes are in the ground."""

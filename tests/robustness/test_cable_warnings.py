@@ -28,6 +28,7 @@ def test_a_straight_pull_has_no_warnings():
     assert "warning" not in repr(run)
 
 
+@pytest.mark.long
 def test_a_shake_that_steps_do_not_follow_is_warned_of():
     """It ended in "completed", and nothing else was said."""
     run = cable.pull_out(shaken, 10.0, cable=HEAVY, scheme=cable.MovingEnd(time_step=0.1))

@@ -12,6 +12,7 @@ import pytest
 from benchmarks.measurements import bergdahl, holcombe, page
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("row", [0, 4])
 def test_a_condition_is_near_its_measurement(row):
     """Two of the quickest, without and with a snap in each turn; the last of seven turns."""
