@@ -77,6 +77,7 @@ def test_few_tests_of_the_diagnosis_know_more_of_it_than_its_faces(stands):
     assert one.tests_below_faces <= 0.1 * one.tests
 
 
+@pytest.mark.long
 def test_the_engine_of_a_diagnosis_is_as_small_as_is_asked_for():
     assert [goal.line() for goal in engine_goals(product()) if not goal.is_met] == []
 
@@ -88,6 +89,7 @@ def test_a_target_that_is_missed_says_so(stands):
         assert (" NOT" in line) == (not goal.is_met)
 
 
+@pytest.mark.long
 def test_every_module_has_a_row(stands):
     assert set(stands) == set(FLOORS)
     assert stands["all"].files == sum(one.files for row, one in stands.items() if row != "all")

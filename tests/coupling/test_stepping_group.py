@@ -51,6 +51,7 @@ def test_threads_give_the_numbers_of_one_after_another(threads):
     group.close()
 
 
+@pytest.mark.long
 def test_a_step_that_is_broken_off_is_finished_before_the_next(monkeypatch):
     alone, together = simulators(), simulators()
     group, share = SteppingGroup(together, 2), stepper.share

@@ -99,6 +99,7 @@ def test_what_makes_no_sense_is_refused(old, new, words):
         cable.read_deck(DECK.replace(old, new, 1))
 
 
+@pytest.mark.long
 def test_the_command_shows_the_lines_and_what_is_left_out(tmp_path, capsys):
     path = tmp_path / "mooring.txt"
     path.write_text(DECK, encoding="utf-8")

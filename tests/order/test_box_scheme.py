@@ -12,6 +12,8 @@ import pytest
 
 from cable import CableProperties, Current, DrumProperties, Equation7, pull_out
 
+pytestmark = pytest.mark.long
+
 
 def pull_out_boxes(tow_velocity, duration, step, *, segment_length=0.5, **others):
     scheme = Equation7(time_step=step, segment_length=segment_length)
@@ -45,7 +47,6 @@ def slopes(errors):
     return np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(("step", "segment_length"), [(0.5, 1.0), (0.1, 0.5), (0.33, 0.2)])
 def test_straight_pull_is_exact_at_every_step(step, segment_length):
     run = pull_out_boxes(lambda _: (1.0, 0.0, 0.0), 10.0, step, segment_length=segment_length)

@@ -21,6 +21,8 @@ from scipy.optimize import brentq
 import cable
 from cable.current import Current
 
+pytestmark = pytest.mark.long
+
 TABLE_1 = cable.CableProperties()
 HEAVY = cable.CableProperties(mass_per_length=0.0098)
 UMBILICAL = cable.CableProperties(mass_per_length=0.12, cross_section_area=1.13e-4, diameter=0.012)
@@ -166,7 +168,6 @@ def test_a_cable_at_rest_hangs_in_a_catenary():
     np.testing.assert_allclose(line[:, 2], depth, rtol=0, atol=5e-4 * S)
 
 
-@pytest.mark.long
 def test_bending_stiffness_lifts_a_sagging_cable_as_that_of_a_tensioned_beam():
     """Hinged at both ends: sag wL²/8T − (w EI/T²)(1 − 1/cosh ½λL), λ = √(T/EI), for a sag of a hundredth of L."""
     sags = []
@@ -271,7 +272,6 @@ AGREE = {"dive": 2e-4, "helix": 3e-4, "U-turn": 1e-2, "umbilical": 8e-3, "vertic
 """At 0.25 m and 0.05 s; the kinks of a cable that jerks taut are left out of the U-turn."""
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("name", CASES)
 def test_both_formulations_go_to_the_same_tow_force_with_second_order(name):
     assert both(name, 2) < AGREE[name]
