@@ -66,6 +66,7 @@ def test_an_unusable_folder_is_refused_before_the_run(what, tmp_path, rails, cap
     assert rails == []
 
 
+@pytest.mark.long
 def test_a_folder_that_cannot_be_known_before_stops_all_files(tmp_path, rails, monkeypatch, capsys):
     monkeypatch.setattr("subzero.results.netcdf_csv.RUN_FILES", ())
     assert simulate(taken(tmp_path)) == MISTAKE

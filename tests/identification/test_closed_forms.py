@@ -36,7 +36,6 @@ from subzero.identification.noise import (
 from subzero.identification.problem import Problem
 from subzero.identification.readings import spikes, spikes_at_ends
 from tests.identification.oscillator import STEP, model, record
-from tests.marks import LONG
 
 
 def line(p, u, t):
@@ -388,7 +387,8 @@ def test_a_delay_that_is_far_from_usual_is_as_probable_as_any_other():
     assert density == pytest.approx(late.odds / (2.0 * 16.0 * own.sd))
 
 
-@pytest.mark.parametrize("third", [False, LONG(True)])
+@pytest.mark.long
+@pytest.mark.parametrize("third", [False, True])
 def test_errors_of_every_sensor_are_an_error_of_the_model(third):
     """Two sensors that both drift name nothing; with a third one that agrees with the model they are named."""
     factors = {"left": 1.0, "right": 2.0, **({"third": 3.0} if third else {})}

@@ -88,7 +88,7 @@ def test_a_delay_that_shows_at_jumps_alone_is_named(late, seed):
 
 
 @pytest.mark.parametrize("factor", [LONG(0.001), 0.1, LONG(30.0 / np.pi), LONG(1000.0)])
-@pytest.mark.parametrize("noise", [True, False])
+@pytest.mark.parametrize("noise", [True, LONG(False)])
 def test_a_wrong_unit_is_named_whether_the_noise_is_declared_or_not(noise, factor):
     verdict = sd.diagnose(record(speed=factor), model(noise))
     (named,) = verdict.named

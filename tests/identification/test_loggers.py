@@ -112,8 +112,9 @@ def test_columns_in_their_places_and_right_clocks_are_not_named(seed):
     assert verdict.verdict == "nothing_wrong"
 
 
-@pytest.mark.parametrize("name, factor", [LONG("power", -1.0), ("second", 1000.0), LONG("power", 1.0 / 60.0)])
-@pytest.mark.parametrize("noise", [True, LONG(False)])
+@pytest.mark.long
+@pytest.mark.parametrize("name, factor", [("power", -1.0), ("second", 1000.0), ("power", 1.0 / 60.0)])
+@pytest.mark.parametrize("noise", [True, False])
 def test_an_input_with_the_other_sign_or_in_another_unit(name, factor, noise):
     given = record(6)
     columns = {**given.columns, name: factor * given.columns[name]}

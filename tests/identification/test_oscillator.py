@@ -81,7 +81,8 @@ def test_a_unit_is_named_whatever_the_parameters_would_bend(factor, words):
     assert words in verdict.named[0].sentence
 
 
-@pytest.mark.parametrize("step", [0.02, LONG(0.05)])
+@pytest.mark.long
+@pytest.mark.parametrize("step", [0.02, 0.05])
 def test_a_unit_of_coarse_readings_is_named(step):
     """Rounded to twice or five times the noise of the sensor, and written in hundredths."""
     seen = record(3)

@@ -177,6 +177,7 @@ def test_a_search_that_is_ended_names_a_known_unit_and_no_sign(monkeypatch, fact
     assert ids(verdict.named + verdict.suspected) == ["unit:b"]
 
 
+@pytest.mark.long
 def test_a_search_whose_time_is_over_before_that_names_no_cause(monkeypatch):
     """A clock that goes by one at each look; after some fits the time is over, and none is kept."""
     monkeypatch.setattr("subzero.identification.search.FOR_UNKNOWN", 0.0)
@@ -190,11 +191,12 @@ def test_a_search_whose_time_is_over_before_that_names_no_cause(monkeypatch):
     assert stiffness.against == ("the search was ended before all that is next to it was tried",)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "error, wrong",
     [
-        LONG("offset:a", lambda a, b: {"a": a + 0.1}),
-        LONG("drift:a", lambda a, b: {"a": a + 0.1 * np.linspace(-0.5, 0.5, SAMPLES)}),
+        ("offset:a", lambda a, b: {"a": a + 0.1}),
+        ("drift:a", lambda a, b: {"a": a + 0.1 * np.linspace(-0.5, 0.5, SAMPLES)}),
         ("unit:b", lambda a, b: {"b": b / 0.3048}),
     ],
 )

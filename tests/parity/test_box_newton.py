@@ -124,6 +124,7 @@ json.dump([h.outcome.completed, *h.tow_force.ravel().tolist()], sys.stdout)
 """
 
 
+@pytest.mark.long
 def test_interpreted_and_compiled_scheme_agree():
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", RUN], capture_output=True, check=True, env=environment)

@@ -247,6 +247,7 @@ def test_a_sea_bed_has_its_jacobian_right_too(friction):
     assert_allclose(analytic / largest, numeric / largest, rtol=0, atol=2e-6)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("segments", [3, 4, 7])
 def test_the_wide_elimination_solves_what_a_dense_one_solves(segments):
     """Verifies `cable.moving_end.block_solver` against LAPACK; round-off only."""

@@ -58,6 +58,7 @@ def test_the_start_is_the_catenary():
     assert sizes(held_still(tether, ends)) == pytest.approx(w * (a + sag), rel=1e-3)
 
 
+@pytest.mark.long
 def test_three_thousand_cycles_of_save_and_restore():
     """MoorDyn 298: after 2000 of them the process died. MoorDyn 259: there was no call for it, and then NaN."""
     tether = cable.Tether(ROPE, length=20.0, ends=[(17.0, 0.0, 5.0), REST], segments=20)
