@@ -22,9 +22,8 @@ from subzero.identification.fit import Fit, Linear
 from subzero.identification.problem import Problem
 
 NEAR_LEFT = 1.4
-"""Largest ratio of the residual, after the unknown inputs, to the most that a sensor errs. [-]"""
-NEAR_SIZE = 3.0
-"""Largest ratio of an unknown input's size to the declared one. [-]"""
+"""Largest ratio of the residual, after the unknown inputs, to the most that a sensor errs; and of an unknown input's size
+to the declared one: where a model surely misses more than its author says, its parameters suit that, too. [-]"""
 NEAR_BEND = 4.0
 """Farthest that a parameter which is not named may be from its nominal value, in tolerances. [-]"""
 
@@ -102,7 +101,7 @@ def nearness(problem: Problem, fitted: Fit, free: Fit) -> Nearness:
     reasons += [
         f"the model misses an input {name!r} of {size:.3g}, {size / declared:.1f} times the declared size"
         for name, (size, declared) in sizes.items()
-        if size > NEAR_SIZE * declared
+        if size > NEAR_LEFT * declared
     ]
     reasons += [
         f"{name} has to be {bend:.1f} tolerances off its nominal value"
