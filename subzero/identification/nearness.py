@@ -22,8 +22,8 @@ from subzero.identification.fit import Fit, Linear
 from subzero.identification.problem import Problem
 
 NEAR_LEFT = 1.4
-"""Largest ratio of the residual, after the unknown inputs, to the most that a sensor errs; and of an unknown input's size
-to the declared one: where a model surely misses more than its author says, its parameters suit that, too. [-]"""
+"""Largest ratio of the residual, after the unknown inputs, to the most that a sensor errs; and of an unknown input's
+size to the declared one: where a model misses more than its author says, its parameters suit that, too. [-]"""
 NEAR_BEND = 4.0
 """Farthest that a parameter which is not named may be from its nominal value, in tolerances. [-]"""
 
