@@ -144,7 +144,7 @@ def _concluded(search: Search, held_out: Sequence[Record], outliers: Mapping[str
     best, probabilities = ranked[0], _probabilities(search, ranked)
     free = free_fit(problem, best.terms, best.values, best.linear.levels.sizes)
     near = nearness(problem, best, free)
-    own = locks(problem, best, free, held_out, settled=search.settled) if near.near else {}
+    own = locks(problem, best, held_out, settled=search.settled) if near.near else {}
     terms = [
         named_term(problem, best, said, own.get(said.term.id), near)
         for said in said_of(ranked, probabilities)

@@ -4,9 +4,6 @@ Of records that were held out the prediction must surely improve. Where the reco
 get worse by the noise of the sensors: other parameters may bend so far that a short last part looks the same. (Wider
 tolerances are a term of the search: what they explain as well is undecided there.)
 
-Where a free simulation leaves more than that of a near model, a term must take more of it than remains: what takes a
-little is how another error of the model looks.
-
     gain = Σ (e/ν)² without the term − Σ (e/ν)² with it     in free simulation of readings that were not fitted
 
 A history says nothing about another time: where an explanation has an unknown input, every second part of a record is
@@ -28,7 +25,7 @@ from scipy.special import ndtri
 from subzero.identification.explanation import CLOCK, Entry, Term, Terms, data_terms, without
 from subzero.identification.fit import Fit, Products, free_fit, spreads
 from subzero.identification.model import COMMAND
-from subzero.identification.nearness import beyond, levels_left, rests_on_histories, witnesses
+from subzero.identification.nearness import rests_on_histories, witnesses
 from subzero.identification.problem import FEWEST_SAMPLES, Problem
 from subzero.identification.record import Record
 
@@ -84,15 +81,12 @@ class Locks:
     reasons: tuple[str, ...]
 
 
-def locks(
-    problem: Problem, best: Fit, free: Fit, held_out: Sequence[Record], *, settled: bool
-) -> dict[str, Locks]:
+def locks(problem: Problem, best: Fit, held_out: Sequence[Record], *, settled: bool) -> dict[str, Locks]:
     """Return the locks of every term of the best explanation: id → locks.
 
     Args:
         problem: records and model.
         best: the fit of the explanation.
-        free: that of the same in free simulation.
         held_out: records that no fit has seen.
         settled: whether all next to the explanation was tried.
     """
@@ -108,39 +102,15 @@ def locks(
         gains |= _gains(problem, best, others, _folds(problem, held_out, split, gap))
     rests = _share_unknown(problem, terms) > MOST and rests_on_histories(problem, best)
     doubted = _doubted(problem, best, rests=rests)
-    surely = [term for term in terms if (gain := gains.get(term.id)) and gain.strict]
-    minor = _minor(
-        problem, best, free, [term for term in terms if term not in surely and not _is_plain(term)]
-    )
     return {
         term.id: _locks(
             term,
             gains.get(term.id),
-            [*_late_commands(problem, term), *doubted.get(term.id, ()), *minor.get(term.id, ())],
+            [*_late_commands(problem, term), *doubted.get(term.id, ())],
             settled,
         )
         for term in terms
     }
-
-
-def _minor(problem: Problem, best: Fit, free: Fit, terms: Sequence[Term]) -> dict[str, list[str]]:
-    """Return term → that it takes less in free simulation, all other numbers fitted again without it, than remains
-    beyond what a near model leaves.
-    """
-    found: dict[str, list[str]] = {}
-    if not (remains := beyond(problem, free)):
-        return found
-    levels, sizes = problem.levels(best.terms), best.linear.levels.sizes
-    after = levels_left(problem, free.linear, levels)
-    for term in terms:
-        lacking = free_fit(problem, without(best.terms, term), best.values, sizes)
-        before = levels_left(problem, lacking.linear, levels)
-        if before**2 - after**2 < remains:
-            found[term.id] = [
-                f"free simulation leaves {before:.2f} levels of the sensors without it and {after:.2f} with it: "
-                "it takes less than remains beyond what a near model leaves"
-            ]
-    return found
 
 
 def _locks(term: Term, gain: Gain | None, reasons: Sequence[str], settled: bool) -> Locks:

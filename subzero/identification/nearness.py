@@ -218,18 +218,6 @@ def _most(problem: Problem, name: str, level: float) -> float:
     return level * float(np.exp(problem.prior(name).spread))
 
 
-def beyond(problem: Problem, free: Fit) -> float:
-    """Return the mean square that a free simulation leaves beyond what a near explanation may, in squared levels."""
-    squares, counts = [], []
-    for name, level in problem.levels(free.terms).items():
-        if name in problem.channels:
-            used = problem.used(name, free.terms)
-            over = rms(free.linear.e[name][used]) ** 2 - most_left(problem, name, level) ** 2
-            squares.append(max(over, 0.0) / level**2)
-            counts.append(int(used.sum()))
-    return float(np.average(squares, weights=counts))
-
-
 def levels_left(problem: Problem, linear: Linear, levels: Mapping[str, float]) -> float:
     """Return the remainder of all channels together, root mean square, in levels of their sensors."""
     e = linear.e

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import subzero.diagnosis as sd
-from benchmarks.diagnosis import structure
 from tests.identification.oscillator import NOISE, model, record
 from tests.marks import LONG
 
@@ -64,12 +63,6 @@ def test_a_second_mass_that_no_term_holds_names_nothing(second, unknown):
     if second == 0.3:
         assert verdict.verdict == "nothing_near"
         assert "not near" in str(verdict).splitlines()[0]
-
-
-@pytest.mark.long
-def test_causes_that_explain_a_little_of_another_error_are_not_named():
-    """Under sines a second mass of 19 % is nearly another stiffness and gain, of 23 and 26 tolerances."""
-    assert structure.run(7320)[3] == ()
 
 
 @pytest.mark.long
@@ -225,7 +218,7 @@ def test_a_verdict_is_text_json_and_a_picture(tmp_path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("seed", [88, 194, 7404, 7410])
+@pytest.mark.parametrize("seed", [88, 194, 7320, 7404, 7410])
 def test_what_is_left_of_a_structure_error_is_not_named(seed):
     """Scale and drive are twins, though the fit of one gains more than the linear problem says; an explanation with a
     term less is fitted again from where one with a term of no size ends; a second mass is nearly a softer spring and a
