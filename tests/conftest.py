@@ -21,6 +21,8 @@ FOLDERS = (
 )
 """Folders in the order of their tests; all others follow."""
 FIRST = ("coupling", "test_exchange.py")
+"""The first file: it compiles hull and cable."""
+HERE = Path(__file__).parent
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -35,8 +37,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def _place(file: Path) -> tuple[int, str]:
-    """Return where a file comes; first one that compiles hull and cable."""
-    folder, *rest = file.relative_to(Path(__file__).parent).parts
+    """Return where a file comes."""
+    folder, *rest = file.relative_to(HERE).parts if file.is_relative_to(HERE) else ("",)
     if (folder, *rest) == FIRST:
         return -1, ""
     return FOLDERS.index(folder) if folder in FOLDERS else len(FOLDERS), str(file)

@@ -21,7 +21,7 @@ from subzero.identification.explanation import CLOCK, kinds_of
 from subzero.identification.fit import Fit, Linear
 from subzero.identification.problem import Problem
 
-NEAR_LEFT = 1.4
+NEAR_RATIO = 1.4
 """Largest ratio of the residual, after the unknown inputs, to the most that a sensor errs; and of an unknown input's
 size to the declared one: where a model misses more than its author says, its parameters suit that, too. [-]"""
 NEAR_BEND = 4.0
@@ -96,12 +96,12 @@ def nearness(problem: Problem, fitted: Fit, free: Fit) -> Nearness:
         f"{each.channel}: {each.followed:.3g} {each.unit} are left, {each.followed / each.most:.1f} times what its "
         f"sensor may err ({each.most:.3g})"
         for each in left
-        if each.followed > NEAR_LEFT * each.most
+        if each.followed > NEAR_RATIO * each.most
     ]
     reasons += [
         f"the model misses an input {name!r} of {size:.3g}, {size / declared:.1f} times the declared size"
         for name, (size, declared) in sizes.items()
-        if size > NEAR_LEFT * declared
+        if size > NEAR_RATIO * declared
     ]
     reasons += [
         f"{name} has to be {bend:.1f} tolerances off its nominal value"
@@ -210,7 +210,7 @@ def follows(problem: Problem, fitted: Fit) -> bool:
 
 def most_left(problem: Problem, name: str, level: float) -> float:
     """Return the most that an explanation leaves of a channel if it is near, root mean square. [unit of the channel]"""
-    return NEAR_LEFT * _most(problem, name, level)
+    return NEAR_RATIO * _most(problem, name, level)
 
 
 def _most(problem: Problem, name: str, level: float) -> float:
